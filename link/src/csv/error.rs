@@ -124,6 +124,12 @@ pub enum ReadError {
         /// Cells on this line.
         found: usize,
     },
+    /// The column of a signal is empty, or holds text alone.
+    #[error("{column} holds no number")]
+    NoNumber {
+        /// Column.
+        column: ColumnLabel,
+    },
     /// A cell is not a number.
     #[error("line {line}, {column}: \"{text}\" is not a number")]
     NotANumber {
@@ -338,9 +344,17 @@ fn possibilities(step: f64, units: &[TimeUnit]) -> String {
 /// Longest text that an error or a note quotes, in characters.
 const MOST_QUOTED: usize = 32;
 
+/// Text of a cell: UTF-8, or else Latin-1. The end may be cut within a letter.
+pub(super) fn decoded(text: &[u8]) -> String {
+    match std::str::from_utf8(text) {
+        Err(error) if error.error_len().is_some() => text.iter().copied().map(char::from).collect(),
+        _ => String::from_utf8_lossy(text).into_owned(),
+    }
+}
+
 /// Text from the file as an error may quote it: short, on one line, printable.
 pub(super) fn quoted(text: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST_QUOTED)]).into_owned();
+    let text = decoded(&text[..text.len().min(4 * MOST_QUOTED)]);
     let mut short: String = text
         .chars()
         .filter(|c| !c.is_control())

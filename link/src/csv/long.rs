@@ -158,6 +158,11 @@ impl Values {
             input.or_else(|| left(output)),
             output.or_else(|| left(input)),
         );
+        if let (Some(input), Some(output), None) = (input, output, options.input_column.as_ref())
+            && names[input].may_be_crossed(&names[output])
+        {
+            return Err(self.unknown(Role::Input));
+        }
         Ok(Chosen {
             input: input.ok_or_else(|| self.unknown(Role::Input))?,
             output: output.ok_or_else(|| self.unknown(Role::Output))?,
@@ -224,6 +229,15 @@ impl Loop {
                 }
             };
             at.signals[tag.signal as usize].get_or_insert(column);
+        }
+        // `PID_1.Input` beside `PID_1.Output` is what the controller measures.
+        for (column, name) in names.iter().enumerate() {
+            let is_crossed = |of: &&mut Self| {
+                (of.of(Signal::Input)).is_some_and(|output| names[output].is_pair(name))
+            };
+            if let Some(of) = all.iter_mut().find(is_crossed) {
+                of.signals[Signal::Output as usize].get_or_insert(column);
+            }
         }
         all
     }

@@ -5,7 +5,7 @@ use crate::recording::{Column, Role};
 use crate::time_unit::TimeUnit;
 
 /// Usual names of the time, in lower case, words joined by `_`, without unit.
-const TIME: [&str; 24] = [
+const TIME: [&str; 33] = [
     "t",
     "time",
     "timestamp",
@@ -30,6 +30,15 @@ const TIME: [&str; 24] = [
     "x_value",
     "millis",
     "micros",
+    "zeit",
+    "zeitstempel",
+    "datum",
+    "uhrzeit",
+    "temps",
+    "horodatage",
+    "tiempo",
+    "fecha",
+    "tempo",
 ];
 
 /// Usual names of the input of the process.
@@ -198,7 +207,7 @@ const UNITS: [&str; 91] = [
 ];
 
 /// Words of names that tell the input of a process: what acts. They count only where no usual name tells.
-const ACTS: [&str; 25] = [
+const ACTS: [&str; 34] = [
     "heater",
     "heating",
     "power",
@@ -224,9 +233,18 @@ const ACTS: [&str; 25] = [
     "ventil",
     "stellwert",
     "stellgr\u{f6}\u{df}e",
+    "heizung",
+    "heizleistung",
+    "leistung",
+    "vanne",
+    "commande",
+    "puissance",
+    "v\u{e1}lvula",
+    "valvola",
+    "potencia",
 ];
 /// Words of names that tell the output of a process: what is measured.
-const MEASURED: [&str; 25] = [
+const MEASURED: [&str; 35] = [
     "temperature",
     "temp",
     "level",
@@ -252,9 +270,19 @@ const MEASURED: [&str; 25] = [
     "druck",
     "drehzahl",
     "istwert",
+    "f\u{fc}llstand",
+    "durchfluss",
+    "temp\u{e9}rature",
+    "pression",
+    "niveau",
+    "d\u{e9}bit",
+    "temperatura",
+    "presi\u{f3}n",
+    "nivel",
+    "caudal",
 ];
 /// Words of names that tell a set-point.
-const WANTED: [&str; 8] = [
+const WANTED: [&str; 10] = [
     "setpoint",
     "target",
     "desired",
@@ -263,6 +291,8 @@ const WANTED: [&str; 8] = [
     "sollwert",
     "soll",
     "wanted",
+    "consigne",
+    "consigna",
 ];
 /// Words of names that say that an `output` or `out` is that of a controller.
 const CONTROLS: [&str; 6] = ["pid", "controller", "control", "ctrl", "regler", "loop"];
@@ -281,7 +311,10 @@ pub(super) struct Name {
 impl Name {
     /// Splits `pv [rad]`, `time (ms)`, `t / s`, `u_N` or `TimeUS` into name and unit.
     pub(super) fn parse(cell: &str) -> Self {
-        let full = cell.trim().trim_matches(['"', '\'']).trim().to_owned();
+        let trimmed = cell.trim();
+        let quotes = |mark| trimmed.strip_prefix(mark)?.strip_suffix(mark);
+        let full = quotes('"').or_else(|| quotes('\'')).unwrap_or(trimmed);
+        let full = full.trim().to_owned();
         // In `LIC101.MV` the last word is no unit.
         let is_tag = tags::parse(&full).is_some();
         let marked = || after_mark(&full).filter(|_| !is_tag);
@@ -352,11 +385,27 @@ impl Name {
         if has(&["output", "out"]) && has(&CONTROLS) {
             return Some(Signal::Input);
         }
+        let is_valve = has(&["valve", "damper", "ventil"]);
         words.iter().rev().find_map(|word| match word.as_str() {
+            "position" if is_valve => Some(Signal::Input),
             word if ACTS.contains(&word) => Some(Signal::Input),
             word if MEASURED.contains(&word) => Some(Signal::Output),
             _ => None,
         })
+    }
+
+    /// Whether `motor.output` was taken for the input and `motor.input` for the output, though no word says that they are those of a
+    /// controller.
+    pub(super) fn may_be_crossed(&self, output: &Self) -> bool {
+        let mut words = words(&self.bare).into_iter();
+        self.is_pair(output) && !words.any(|word| CONTROLS.contains(&word.as_str()))
+    }
+
+    /// Whether this is the output of a block and the other name its input: `PID_1.Output` and `PID_1.Input`.
+    pub(super) fn is_pair(&self, input: &Self) -> bool {
+        let [own, other] = [self, input].map(|name| key(&name.bare));
+        let stem = own.strip_suffix("_output");
+        stem.is_some() && stem == other.strip_suffix("_input")
     }
 
     /// The unit of time that the name gives, also in names such as `seconds` or `millis`.

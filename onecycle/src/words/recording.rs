@@ -105,6 +105,9 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
             "correct the line, or separate the columns by semicolons if they hold decimal commas"
         }
         E::NotANumber { .. } => "correct it or leave it empty",
+        E::NoNumber { .. } => {
+            "choose another with `input` or `output`, or export it with its values"
+        }
         E::MixedDecimals { .. } => "export it with one of them and without separators of thousands",
         E::SeveralLoops { .. } => "choose one with `tag`",
         E::NoSuchLoop { .. } => {
