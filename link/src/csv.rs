@@ -167,7 +167,7 @@ fn opened<'a>(
         let (sheet, format) = json::read(&file)?;
         return Ok(of_sheet(sheet, format));
     }
-    let (text, format) = forms::table(text)?;
+    let (text, format) = forms::table(text, options.dbc.as_deref())?;
     let separator = match format {
         Some(_) => Separator::Tab,
         None => dialect::detect(&text.head, text.whole)?,

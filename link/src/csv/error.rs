@@ -130,6 +130,23 @@ pub enum ReadError {
         /// Column.
         column: ColumnLabel,
     },
+    /// Frames of a CAN bus without a description, or with that of other frames.
+    #[error(
+        "{}", if *.is_given { "the DBC file describes no frame of this log of candump" } else { "a log of candump holds bytes, and no DBC file says what they are" }
+    )]
+    NoDbc {
+        /// Whether there is a DBC file.
+        is_given: bool,
+    },
+    /// The frames of a log of candump have no times, or times since the frame before.
+    #[error("the frames of this log of candump have no times that count from one start")]
+    NoCanTimes,
+    /// A DBC file has a signal that cannot be read, or none.
+    #[error("the DBC file has no signal that can be read on line {line}")]
+    BadDbc {
+        /// Line in the DBC file, from 1.
+        line: usize,
+    },
     /// A cell is not a number.
     #[error("line {line}, {column}: \"{text}\" is not a number")]
     NotANumber {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::error::{ReadError, quoted};
+use super::error::{ReadError, decoded, quoted};
 use super::names::{Name, key};
 use super::options::{ColumnRef, CsvOptions};
 use super::tags::Signal;
@@ -28,6 +28,15 @@ struct Tagged {
     values: Vec<(f64, f64, u64)>,
 }
 
+/// The rows of a loop, and what they are.
+pub(super) struct Rows {
+    pub(super) rows: Vec<Woven>,
+    pub(super) notes: Vec<Note>,
+    pub(super) input: Name,
+    pub(super) output: Name,
+    pub(super) set_point: Option<Name>,
+}
+
 /// The tags of the signals of a loop.
 #[derive(Debug, Clone, Copy)]
 struct Chosen {
@@ -49,7 +58,7 @@ impl Values {
             None => {
                 self.index_of.insert(tag.to_vec(), self.tags.len());
                 self.tags.push(Tagged {
-                    name: quoted(tag),
+                    name: decoded(tag),
                     values: vec![],
                 });
                 self.tags.len() - 1
@@ -64,10 +73,7 @@ impl Values {
     }
 
     /// The rows of the chosen loop in order of time, and what was chosen.
-    pub(super) fn rows(
-        mut self,
-        options: &CsvOptions,
-    ) -> Result<(Vec<Woven>, Vec<Note>), ReadError> {
+    pub(super) fn rows(mut self, options: &CsvOptions) -> Result<Rows, ReadError> {
         let chosen = self.choose(options)?;
         let times = |tag: usize| self.tags[tag].values.iter().map(|value| value.0);
         let is_shared = times(chosen.input).eq(times(chosen.output));
@@ -98,7 +104,7 @@ impl Values {
             }
         }
         rows.extend(weave.finish());
-        let name = |tag: usize| self.tags[tag].name.clone();
+        let name = |tag: usize| quoted(self.tags[tag].name.as_bytes());
         let mut notes = vec![Note::TagsChosen {
             input: name(chosen.input),
             output: name(chosen.output),
@@ -110,7 +116,14 @@ impl Values {
                 outputs: weave.outputs,
             });
         }
-        Ok((rows, notes))
+        let name = |tag: usize| Name::parse(&self.tags[tag].name);
+        Ok(Rows {
+            rows,
+            notes,
+            input: name(chosen.input),
+            output: name(chosen.output),
+            set_point: chosen.set_point.map(name),
+        })
     }
 
     fn choose(&self, options: &CsvOptions) -> Result<Chosen, ReadError> {
@@ -119,6 +132,7 @@ impl Values {
             Some(ColumnRef::Name(wanted)) => (names.iter())
                 .position(|name| name.full == *wanted)
                 .or_else(|| names.iter().position(|name| key(&name.full) == key(wanted)))
+                .or_else(|| names.iter().position(|name| key(&name.bare) == key(wanted)))
                 .map(Some)
                 .ok_or_else(|| self.unknown(role)),
             // Tags have no numbers.
@@ -173,7 +187,11 @@ impl Values {
     fn unknown(&self, role: Role) -> ReadError {
         ReadError::UnknownTag {
             role,
-            tags: self.tags.iter().map(|tag| tag.name.clone()).collect(),
+            tags: self
+                .tags
+                .iter()
+                .map(|tag| quoted(tag.name.as_bytes()))
+                .collect(),
         }
     }
 }

@@ -450,7 +450,7 @@ fn words(name: &str) -> Vec<String> {
         if is_new {
             words.push(String::new());
         }
-        was_lower = c.is_lowercase();
+        was_lower = c.is_lowercase() || c.is_ascii_digit();
         if let Some(word) = words.last_mut().filter(|_| c.is_alphanumeric()) {
             word.extend(c.to_lowercase());
         }

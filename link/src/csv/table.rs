@@ -257,10 +257,20 @@ impl<'a> Table<'a> {
     /// The recording.
     pub(super) fn finish(mut self, options: &CsvOptions) -> Result<Recording, ReadError> {
         if let Some(values) = self.values.take() {
-            let (rows, notes) = values.rows(options)?;
-            notes.into_iter().for_each(|note| self.builder.note(note));
+            let of = values.rows(options)?;
+            of.notes
+                .into_iter()
+                .for_each(|note| self.builder.note(note));
             self.builder.mark_own_stamps();
-            for row in rows {
+            // A unit behind the numbers is that of all tags.
+            let unit = self.preview.unit(self.choice.output).unwrap_or_default();
+            let signals = [Some(of.input), Some(of.output), of.set_point];
+            let [input, output, set_point] =
+                signals.map(|name| Some(name?.with_unit(unit).column()));
+            if let (Some(input), Some(output)) = (input, output) {
+                self.builder.name_signals(input, output, set_point);
+            }
+            for row in of.rows {
                 self.push_woven(&row, Stamp::Real(row.time_s))?;
             }
         }

@@ -157,3 +157,21 @@ fn titles_above_pairs_of_columns() {
     let none = table("Time [s],Value,Time [s],Value", row);
     assert!(refusal(&none).contains("no tag is known to be the input"));
 }
+
+// Names longer than a message quotes, with units: those of the signals, not of the first column.
+#[test]
+fn signals_of_groups_have_their_units() {
+    let header = "Time [s],Application.Oven.rHeaterPowerOfZone1 [%],Time [s],Application.Oven.rHeaterZone1Temperature [degC]";
+    let recording = read(&table(header, |i, u, y| format!("{i},{u},{i},{y}")));
+    assert_rows(&recording, 1.0, 1.0);
+    let columns = recording.columns();
+    assert_eq!(columns.input.name, "Application.Oven.rHeaterPowerOfZone1");
+    let units = [&columns.input, &columns.output].map(|column| column.unit.as_deref());
+    assert_eq!(units, [Some("%"), Some("degC")]);
+    let named = CsvOptions::default().output_column("Application.Oven.rHeaterZone1Temperature");
+    assert_rows(
+        &read_with(&table(header, |i, u, y| format!("{i},{u},{i},{y}")), &named),
+        1.0,
+        1.0,
+    );
+}
