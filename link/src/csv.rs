@@ -5,6 +5,7 @@
 //!                    arrays of MATLAB files (feature `matlab`)              matlab.rs
 //!                    logs whose lines name their values                     forms.rs
 //!                    JSON, TDMS and WPILOG                                  json.rs, tdms.rs, wpilog.rs, sheet.rs
+//!                    topics of MCAP (feature `mcap`)                        topics.rs
 //! text -> lines      line endings, comments, runs of blanks                 lines.rs
 //! lines -> rows      quotes, separators                                     records.rs
 //! first rows         separator, header, units, which column is which        dialect.rs, preview.rs,
@@ -38,6 +39,8 @@ mod table;
 mod tags;
 mod tdms;
 mod text;
+#[cfg(feature = "mcap")]
+mod topics;
 mod unit;
 mod weave;
 mod wpilog;
@@ -88,7 +91,7 @@ pub fn read(path: impl AsRef<Path>, options: &CsvOptions) -> Result<Recording, R
 
 /// Reads a recording from bytes, in one pass and in bounded memory. `bytes` need not be buffered.
 ///
-/// The bytes may also be those of a log of a printer, a thermostat or an Arduino, of JSON, TDMS or a log of WPILib; lines are then those
+/// The bytes may also be those of a log of a printer, a thermostat or an Arduino, of JSON, TDMS, a log of WPILib or MCAP (feature `mcap`); lines are then those
 /// of the log, or rows. With the feature `matlab` they may be those of a MATLAB file of version 5 (`save -v7`): the columns of matrices,
 /// and the fields of structures, of one length are the columns of the table. Line 1 then stands for the names, line 2 for the first row.
 ///
@@ -144,6 +147,8 @@ fn opened<'a>(
     let is_mat = head == matlab::MAGIC;
     let begins = |magic| head.starts_with(magic);
     let (is_tdms, is_wpilog) = (begins(tdms::MAGIC), begins(wpilog::MAGIC));
+    #[cfg(feature = "mcap")]
+    let is_mcap = begins(topics::MAGIC);
     let bytes = std::io::Cursor::new(head).chain(bytes);
     #[cfg(feature = "matlab")]
     if is_mat {
@@ -152,6 +157,11 @@ fn opened<'a>(
         let separator = dialect::detect(&text.head, text.whole)?;
         let (columns, rows) = (table.columns, table.rows);
         return Ok((text, separator, Some(Note::MatFile { columns, rows })));
+    }
+    #[cfg(feature = "mcap")]
+    if is_mcap {
+        let sheet = topics::read(&whole(bytes, MOST_BYTES)?, &wanted(options))?;
+        return Ok(of_sheet(sheet, "an MCAP log of ROS 2"));
     }
     if is_tdms || is_wpilog {
         let file = whole(bytes, MOST_BYTES)?;
