@@ -123,7 +123,10 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
         }
         let line = row.line;
         if let Err(fault) = table.add(&row) {
-            forgive_last_line(&mut records, line, fault)?;
+            // `EOF`, also with the separators behind it.
+            let mut rest = row.cells.iter().skip(1);
+            let is_word = rest.all(|cell| number::bare(cell).is_empty());
+            forgive_last_line(&mut records, (line, is_word), fault)?;
             table.builder.note(Note::LastLineIncomplete { line });
         }
     }
@@ -226,10 +229,10 @@ fn name_of(column: &Option<ColumnRef>) -> Option<&str> {
     }
 }
 
-/// Accepts a last line that lacks cells, or whose last cell was cut off.
+/// Accepts a last line that lacks cells, holds nothing behind a word, or whose last cell was cut off.
 fn forgive_last_line(
     records: &mut Records<impl Read>,
-    line: u64,
+    (line, is_word): (u64, bool),
     fault: ReadError,
 ) -> Result<(), ReadError> {
     let is_last = records.next()?.is_none();
@@ -238,7 +241,7 @@ fn forgive_last_line(
         ReadError::RaggedRow {
             expected, found, ..
         } if is_last && found < expected => Ok(()),
-        ReadError::NotANumber { .. } if is_last && ends_open => Ok(()),
+        ReadError::NotANumber { .. } if is_last && (ends_open || is_word) => Ok(()),
         _ => Err(fault),
     }
 }

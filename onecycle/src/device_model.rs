@@ -8,8 +8,8 @@
 use onecycle_design::{Spans, Vendor};
 use onecycle_identify::{Identified, Interval};
 
-use crate::Parameter;
 use crate::words::number::{short, significant};
+use crate::{Parameter, Structure};
 
 /// Least dead time (s) that RepRapFirmware takes.
 const LEAST_DEAD_TIME_S: f64 = 0.1;
@@ -64,15 +64,17 @@ fn inverse(gain: &Interval) -> Option<String> {
 
 /// The command `M307`; the firmware designs its own controller for this model.
 fn heater_model(identified: &Identified, heater: u8, full: f64) -> String {
-    let stages = identified.model.structure().stages();
+    let is_one_lag = identified.model.structure() == Structure::Foptd;
     let of = |parameter| identified.model.parameter(parameter);
     let values = (
         of(Parameter::KOverTBody),
         of(Parameter::TBody),
         of(Parameter::Tau),
     );
-    match (stages.integrators, stages.poles, stages.pairs, values) {
-        (0, 1, 0, (Some(rate), Some(lag_s), Some(tau_s))) if rate * full > 0.0 && lag_s > 0.0 => {
+    match values {
+        (Some(rate), Some(lag_s), Some(tau_s))
+            if is_one_lag && rate * full > 0.0 && lag_s > 0.0 =>
+        {
             format!(
                 "M307 H{heater} R{:.3} K{:.3}:0 D{:.2} E1.00 S1.00",
                 rate * full,

@@ -172,15 +172,20 @@ fn a_printer_with_a_model_gets_its_model() {
         line.contains("feedforward kS 0 (no dry friction seen)") && line.contains(", kA 0.3"),
         "{line}"
     );
-    let two = run(&[
+    // A power of 0 to 1 is not taken for one of 0 to 127.
+    run(&["identify", &table, "--vendor", "marlin"])
+        .misused(&["the input only reaches 1", "--input-range 0..1"]);
+    let two = [
         "identify",
         &table,
         "--details",
         "--structure",
         "soptd",
+        "--input-range",
+        "0..1",
         "--vendor",
         "marlin",
-    ])
-    .stdout;
-    assert!(two.contains("M307 takes one lag"), "{two}");
+    ];
+    let two = run(&two).stdout;
+    assert!(two.contains("takes one lag and a dead time"), "{two}");
 }

@@ -297,6 +297,9 @@ const WANTED: [&str; 10] = [
 /// Words of names that say that an `output` or `out` is that of a controller.
 const CONTROLS: [&str; 6] = ["pid", "controller", "control", "ctrl", "regler", "loop"];
 
+/// Words before a letter that is a label, not a unit.
+const LABELLED: [&str; 6] = ["channel", "ch", "kanal", "canal", "voie", "probe"];
+
 /// A name in a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Name {
@@ -490,7 +493,9 @@ fn after_mark(name: &str) -> Option<(&str, &str)> {
         .filter(|(_, c)| matches!(c, '/' | ',' | '_' | ' ' | '.'));
     for (at, mark) in marks {
         let parts = (&name[..at], &name[at + mark.len_utf8()..]);
-        if split(parts) {
+        // `Channel A` is no current.
+        let is_label = LABELLED.contains(&key(parts.0).as_str());
+        if split(parts) && !is_label {
             return Some((parts.0.trim(), parts.1.trim()));
         }
     }

@@ -175,3 +175,51 @@ fn signals_of_groups_have_their_units() {
         1.0,
     );
 }
+
+#[test]
+fn traces_of_plcs() {
+    // CODESYS 2: the first column counts cycles of the task.
+    let cycles = table(
+        "CODESYS Trace\nC:\\OVEN.PRO\nCycle PLC_PRG.fHeater PLC_PRG.fTemp",
+        |i, u, y| format!("{i} {u} {y}"),
+    );
+    assert!(refusal(&cycles).contains("\"Cycle\" (column 1) gives no unit of time"));
+    assert_rows(
+        &read_with(&cycles, &CsvOptions::default().sample_rate_hz(10.0)),
+        0.1,
+        1.0,
+    );
+    // A number of each sample beside a time.
+    let tia = table(
+        "\"Trace\";\"Oven\"\n\n\"Sample\";\"Time [ms]\";\"\"\"Data\"\".Heater\";\"\"\"Data\"\".Temperature\"",
+        |i, u, y| format!("{i};{};{u};{}", 1000 * i, comma(y)),
+    );
+    assert_rows(&read(&tia), 1.0, 1.0);
+    let twincat = table(
+        "Name;fHeater;Name;fTemp\nSampleTime[ms];1000;SampleTime[ms];1000",
+        |i, u, y| format!("{};{u};{};{}", 1000 * i, 1000 * i, comma(y)),
+    );
+    assert_rows(&read(&[&twincat[..], b"EOF;;;\n"].concat()), 1.0, 1.0);
+}
+
+#[test]
+fn letters_of_channels_are_no_units() {
+    let text = table("Time,Channel A,Channel B\n(ms),(mV),(V)\n", |i, u, y| {
+        format!("{}.5,{u},{y}", 1000 * i)
+    });
+    let recording = read(&text);
+    assert_rows(&recording, 1.0, 1.0);
+    assert_eq!(recording.columns().input.unit.as_deref(), Some("mV"));
+    assert_eq!(recording.columns().output.name, "Channel B");
+}
+
+// A unit that begins a line is no comment.
+#[test]
+fn units_in_json() {
+    let rows = rows(|i, u, y| {
+        format!(
+            "{{\"time_s\":{i}.5,\"heater\":{{\"unit\":\"%\",\"value\":{u}}},\"temperature\":{{\"value\":{y}}}}}"
+        )
+    });
+    assert_rows(&read(rows.as_bytes()), 1.0, 1.0);
+}
