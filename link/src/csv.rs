@@ -9,8 +9,8 @@
 //! text -> lines      line endings, comments, runs of blanks                 lines.rs
 //! lines -> rows      quotes, separators                                     records.rs
 //! first rows         separator, header, units, which column is which        dialect.rs, preview.rs,
-//!                                                                           names.rs, columns.rs, shape.rs, meaning.rs
-//!                                                                           tags.rs
+//!                                                                           names.rs, words.rs, columns.rs, shape.rs,
+//!                                                                           meaning.rs, tags.rs
 //! rows -> samples    numbers, stamps, status; signals with their own stamps table.rs, number.rs, clock.rs, unit.rs,
 //!                                                                           date.rs, weave.rs, long.rs
 //! ```
@@ -43,6 +43,7 @@ mod text;
 mod topics;
 mod unit;
 mod weave;
+mod words;
 mod wpilog;
 mod write;
 

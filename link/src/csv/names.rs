@@ -1,6 +1,7 @@
 //! Column names: their units and the signals they stand for.
 
 use super::tags::{self, Signal, Tag};
+use super::words;
 use crate::recording::{Column, Role};
 use crate::time_unit::TimeUnit;
 
@@ -206,97 +207,6 @@ const UNITS: [&str; 91] = [
     "degrees",
 ];
 
-/// Words of names that tell the input of a process: what acts. They count only where no usual name tells.
-const ACTS: [&str; 34] = [
-    "heater",
-    "heating",
-    "power",
-    "duty",
-    "pwm",
-    "valve",
-    "pump",
-    "throttle",
-    "volt",
-    "volts",
-    "voltage",
-    "actuator",
-    "relay",
-    "switch",
-    "cmd",
-    "command",
-    "burner",
-    "effort",
-    "op",
-    "mv",
-    "co",
-    "dac",
-    "ventil",
-    "stellwert",
-    "stellgr\u{f6}\u{df}e",
-    "heizung",
-    "heizleistung",
-    "leistung",
-    "vanne",
-    "commande",
-    "puissance",
-    "v\u{e1}lvula",
-    "valvola",
-    "potencia",
-];
-/// Words of names that tell the output of a process: what is measured.
-const MEASURED: [&str; 35] = [
-    "temperature",
-    "temp",
-    "level",
-    "pressure",
-    "flow",
-    "speed",
-    "velocity",
-    "position",
-    "angle",
-    "humidity",
-    "thermocouple",
-    "probe",
-    "rpm",
-    "height",
-    "ph",
-    "encoder",
-    "pv",
-    "adc",
-    "measured",
-    "actual",
-    "feedback",
-    "temperatur",
-    "druck",
-    "drehzahl",
-    "istwert",
-    "f\u{fc}llstand",
-    "durchfluss",
-    "temp\u{e9}rature",
-    "pression",
-    "niveau",
-    "d\u{e9}bit",
-    "temperatura",
-    "presi\u{f3}n",
-    "nivel",
-    "caudal",
-];
-/// Words of names that tell a set-point.
-const WANTED: [&str; 10] = [
-    "setpoint",
-    "target",
-    "desired",
-    "reference",
-    "sp",
-    "sollwert",
-    "soll",
-    "wanted",
-    "consigne",
-    "consigna",
-];
-/// Words of names that say that an `output` or `out` is that of a controller.
-const CONTROLS: [&str; 6] = ["pid", "controller", "control", "ctrl", "regler", "loop"];
-
 /// Words before a letter that is a label, not a unit.
 const LABELLED: [&str; 6] = ["channel", "ch", "kanal", "canal", "voie", "probe"];
 
@@ -380,28 +290,13 @@ impl Name {
     /// The signal that the words of the name tell, where it is no usual name: the last word that tells one, so
     /// that `heater_temperature` is a temperature; a set-point in any place.
     pub(super) fn told(&self) -> Option<Signal> {
-        let words = words(&self.bare);
-        let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
-        if has(&WANTED) || key(&self.bare).contains("set_point") {
-            return Some(Signal::SetPoint);
-        }
-        if has(&["output", "out"]) && has(&CONTROLS) {
-            return Some(Signal::Input);
-        }
-        let is_valve = has(&["valve", "damper", "ventil"]);
-        words.iter().rev().find_map(|word| match word.as_str() {
-            "position" if is_valve => Some(Signal::Input),
-            word if ACTS.contains(&word) => Some(Signal::Input),
-            word if MEASURED.contains(&word) => Some(Signal::Output),
-            _ => None,
-        })
+        words::told(&self.bare)
     }
 
     /// Whether `motor.output` was taken for the input and `motor.input` for the output, though no word says that they are those of a
     /// controller.
     pub(super) fn may_be_crossed(&self, output: &Self) -> bool {
-        let mut words = words(&self.bare).into_iter();
-        self.is_pair(output) && !words.any(|word| CONTROLS.contains(&word.as_str()))
+        self.is_pair(output) && !words::is_of_controller(&self.bare)
     }
 
     /// Whether this is the output of a block and the other name its input: `PID_1.Output` and `PID_1.Input`.
@@ -442,28 +337,6 @@ pub(super) fn key(name: &str) -> String {
         .split(|c: char| !c.is_alphanumeric())
         .filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join("_")
-}
-
-/// The words of a name in lower case, without digits at their ends: `fTemp` is `f` and `temp`.
-fn words(name: &str) -> Vec<String> {
-    let mut words = vec![String::new()];
-    let mut was_lower = false;
-    for c in name.chars() {
-        let is_new = !c.is_alphanumeric() || (was_lower && c.is_uppercase());
-        if is_new {
-            words.push(String::new());
-        }
-        was_lower = c.is_lowercase() || c.is_ascii_digit();
-        if let Some(word) = words.last_mut().filter(|_| c.is_alphanumeric()) {
-            word.extend(c.to_lowercase());
-        }
-    }
-    let bare = words
-        .iter()
-        .map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
-    bare.filter(|word| !word.is_empty())
-        .map(str::to_owned)
-        .collect()
 }
 
 pub(super) fn is_known_unit(unit: &str) -> bool {
