@@ -5,11 +5,12 @@
 //!                    arrays of MATLAB files (feature `matlab`)              matlab.rs
 //!                    logs whose lines name their values                     forms.rs
 //!                    JSON, TDMS and WPILOG                                  json.rs, tdms.rs, wpilog.rs, sheet.rs
+//!                    topics of MCAP (feature `mcap`)                        topics.rs
 //! text -> lines      line endings, comments, runs of blanks                 lines.rs
 //! lines -> rows      quotes, separators                                     records.rs
 //! first rows         separator, header, units, which column is which        dialect.rs, preview.rs,
-//!                                                                           names.rs, columns.rs, shape.rs, meaning.rs
-//!                                                                           tags.rs
+//!                                                                           names.rs, words.rs, columns.rs, shape.rs,
+//!                                                                           meaning.rs, tags.rs
 //! rows -> samples    numbers, stamps, status; signals with their own stamps table.rs, number.rs, clock.rs, unit.rs,
 //!                                                                           date.rs, weave.rs, long.rs
 //! ```
@@ -38,8 +39,11 @@ mod table;
 mod tags;
 mod tdms;
 mod text;
+#[cfg(feature = "mcap")]
+mod topics;
 mod unit;
 mod weave;
+mod words;
 mod wpilog;
 mod write;
 
@@ -88,7 +92,7 @@ pub fn read(path: impl AsRef<Path>, options: &CsvOptions) -> Result<Recording, R
 
 /// Reads a recording from bytes, in one pass and in bounded memory. `bytes` need not be buffered.
 ///
-/// The bytes may also be those of a log of a printer, a thermostat or an Arduino, of JSON, TDMS or a log of WPILib; lines are then those
+/// The bytes may also be those of a log of a printer, a thermostat or an Arduino, of JSON, TDMS, a log of WPILib or MCAP (feature `mcap`); lines are then those
 /// of the log, or rows. With the feature `matlab` they may be those of a MATLAB file of version 5 (`save -v7`): the columns of matrices,
 /// and the fields of structures, of one length are the columns of the table. Line 1 then stands for the names, line 2 for the first row.
 ///
@@ -120,7 +124,10 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
         }
         let line = row.line;
         if let Err(fault) = table.add(&row) {
-            forgive_last_line(&mut records, line, fault)?;
+            // `EOF`, also with the separators behind it.
+            let mut rest = row.cells.iter().skip(1);
+            let is_word = rest.all(|cell| number::bare(cell).is_empty());
+            forgive_last_line(&mut records, (line, is_word), fault)?;
             table.builder.note(Note::LastLineIncomplete { line });
         }
     }
@@ -144,6 +151,8 @@ fn opened<'a>(
     let is_mat = head == matlab::MAGIC;
     let begins = |magic| head.starts_with(magic);
     let (is_tdms, is_wpilog) = (begins(tdms::MAGIC), begins(wpilog::MAGIC));
+    #[cfg(feature = "mcap")]
+    let is_mcap = begins(topics::MAGIC);
     let bytes = std::io::Cursor::new(head).chain(bytes);
     #[cfg(feature = "matlab")]
     if is_mat {
@@ -152,6 +161,11 @@ fn opened<'a>(
         let separator = dialect::detect(&text.head, text.whole)?;
         let (columns, rows) = (table.columns, table.rows);
         return Ok((text, separator, Some(Note::MatFile { columns, rows })));
+    }
+    #[cfg(feature = "mcap")]
+    if is_mcap {
+        let sheet = topics::read(&whole(bytes, MOST_BYTES)?, &wanted(options))?;
+        return Ok(of_sheet(sheet, "an MCAP log of ROS 2"));
     }
     if is_tdms || is_wpilog {
         let file = whole(bytes, MOST_BYTES)?;
@@ -167,7 +181,7 @@ fn opened<'a>(
         let (sheet, format) = json::read(&file)?;
         return Ok(of_sheet(sheet, format));
     }
-    let (text, format) = forms::table(text)?;
+    let (text, format) = forms::table(text, options.dbc.as_deref())?;
     let separator = match format {
         Some(_) => Separator::Tab,
         None => dialect::detect(&text.head, text.whole)?,
@@ -216,10 +230,10 @@ fn name_of(column: &Option<ColumnRef>) -> Option<&str> {
     }
 }
 
-/// Accepts a last line that lacks cells, or whose last cell was cut off.
+/// Accepts a last line that lacks cells, holds nothing behind a word, or whose last cell was cut off.
 fn forgive_last_line(
     records: &mut Records<impl Read>,
-    line: u64,
+    (line, is_word): (u64, bool),
     fault: ReadError,
 ) -> Result<(), ReadError> {
     let is_last = records.next()?.is_none();
@@ -228,7 +242,7 @@ fn forgive_last_line(
         ReadError::RaggedRow {
             expected, found, ..
         } if is_last && found < expected => Ok(()),
-        ReadError::NotANumber { .. } if is_last && ends_open => Ok(()),
+        ReadError::NotANumber { .. } if is_last && (ends_open || is_word) => Ok(()),
         _ => Err(fault),
     }
 }

@@ -18,6 +18,8 @@ pub enum TimeUnit {
     Microseconds,
     /// 1e-9 s.
     Nanoseconds,
+    /// 1e-7 s, in which Windows counts from the year 1601.
+    Ticks,
 }
 
 impl TimeUnit {
@@ -34,6 +36,7 @@ impl TimeUnit {
             "us" | "\u{b5}s" | "\u{3bc}s" | "\u{fffd}s" | "usec" | "usecs" | "micros"
             | "microsecond" | "microseconds" => Self::Microseconds,
             "ns" | "nsec" | "nsecs" | "nanos" | "nanosecond" | "nanoseconds" => Self::Nanoseconds,
+            "100 ns" | "100ns" | "filetime" => Self::Ticks,
             _ => return None,
         })
     }
@@ -48,6 +51,7 @@ impl TimeUnit {
             Self::Milliseconds => "ms",
             Self::Microseconds => "us",
             Self::Nanoseconds => "ns",
+            Self::Ticks => "100 ns",
         }
     }
 
@@ -62,6 +66,7 @@ impl TimeUnit {
             Self::Milliseconds => time / 1e3,
             Self::Microseconds => time / 1e6,
             Self::Nanoseconds => time / 1e9,
+            Self::Ticks => time / 1e7,
         }
     }
 }

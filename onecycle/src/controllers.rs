@@ -7,6 +7,7 @@ use onecycle_design::{
 };
 use onecycle_identify::Identified;
 
+use crate::device_model;
 use crate::results::controllers::{Against, Controllers, Row, Source};
 use crate::threads::each;
 
@@ -54,6 +55,16 @@ impl Controllers {
     #[must_use]
     pub fn in_plant(self, plant: Option<(Vendor, Spans)>) -> Self {
         Self { plant, ..self }
+    }
+
+    /// With the model as the devices of this controller take it.
+    #[must_use]
+    pub(crate) fn with_device_model(self, identified: &Identified) -> Self {
+        let device_model = device_model::of(identified, self.plant);
+        Self {
+            device_model,
+            ..self
+        }
     }
 
     /// With the designs for `model` over limits of `Ms`; the other limits are those of the chosen controller.
@@ -127,6 +138,7 @@ fn controllers(
         trade_off: vec![],
         source: Source::Process,
         plant: None,
+        device_model: None,
     }
 }
 

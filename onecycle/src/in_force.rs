@@ -86,7 +86,7 @@ impl InForce {
     }
 }
 
-/// Refuses a recording whose input leaves the range that it has if none is given: the gains would be wrong by their ratio.
+/// Refuses a recording whose input leaves the range that it has if none is given, or one of 0 to 1 where that is larger: the gains would be wrong by their ratio.
 fn check_range(vendor: Vendor, recording: &Recording) -> Result<(), Error> {
     /// Ripple and rounding of a full output.
     const RIPPLE: f64 = 1.05;
@@ -95,11 +95,14 @@ fn check_range(vendor: Vendor, recording: &Recording) -> Result<(), Error> {
         .input()
         .iter()
         .fold(0.0, |most: f64, input| most.max(input.abs()));
-    if !vendor.counts_output() || most <= RIPPLE * full {
+    // An input that stays within 1 of a hundred is a share.
+    let is_share = full > 1.0 && most <= 1.0;
+    if !vendor.counts_output() || (most <= RIPPLE * full && !is_share) {
         return Ok(());
     }
+    let (only, such) = if is_share { ("only ", 1) } else { ("", 100) };
     Err(Error::Request(format!(
-        "the input reaches {most}, and `vendor={}` takes 0..{full} for its range: give the range of the recorded input, such as `input_range=0..100`",
+        "the input {only}reaches {most}, and `vendor={}` takes 0..{full} for its range: give the range of the recorded input, such as `input_range=0..{such}`",
         vendor.name()
     )))
 }

@@ -269,6 +269,7 @@ mod answer;
 mod builder;
 mod controllers;
 mod design;
+mod device_model;
 mod error;
 mod feedback;
 mod in_force;

@@ -330,6 +330,7 @@ impl Request {
             "tag" => put(&mut columns.control_loop, Ok(value.to_owned())),
             "sample_rate" => put(&mut columns.sample_rate_hz, values::sample_rate(value)),
             "time_unit" => put(&mut columns.time_unit, values::time_unit(value)),
+            "dbc" => put(&mut columns.dbc, values::dbc(value)),
             "axis" => put(&mut self.axis, choice(value, &values::AXES)),
             "loop" => put(&mut self.control_loop, choice(value, &values::LOOPS)),
             "flight" => put(
@@ -474,6 +475,7 @@ impl Request {
             ("tag", columns.control_loop.is_some()),
             ("sample_rate", columns.sample_rate_hz.is_some()),
             ("time_unit", columns.time_unit.is_some()),
+            ("dbc", columns.dbc.is_some()),
         ];
         match given(&options) {
             Some(setting) => Err(Error::Request(format!(

@@ -178,9 +178,11 @@ impl Request {
         let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
         let against = set.against.or_else(in_force);
         let identified = identification.outcome.as_ref().ok();
-        let choice = identified
-            .map(|identified| Controllers::of_identified(identified, against))
-            .map(|choice| choice.in_plant(set.plant));
+        let choice = identified.map(|identified| {
+            Controllers::of_identified(identified, against)
+                .in_plant(set.plant)
+                .with_device_model(identified)
+        });
         let choice = match (&of_log, set.against, choice) {
             (Some(of_log), None, Some(choice)) if of_log.contradicts(&choice) => {
                 identification.refuse(Verdict::UnstableInForce);

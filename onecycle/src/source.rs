@@ -61,9 +61,22 @@ impl Source for PathBuf {
     }
 }
 
-/// Whether a source begins like a flight log.
+/// Whether a source begins like a flight log. An MCAP log must have signals of PX4: others are tables.
 pub fn is_flight_log(source: &dyn Source) -> bool {
-    LogFormat::detect(&source.head(LogFormat::HEAD_BYTES as u64)).is_some()
+    match LogFormat::detect(&source.head(LogFormat::HEAD_BYTES as u64)) {
+        Some(LogFormat::Mcap) => {
+            let has_loop = |flight: &Flight| {
+                (flight.loops.iter()).any(|one| one.input.is_some() || one.output.is_some())
+            };
+            match source.open().map(FlightLog::scan) {
+                Ok(Ok(log)) => log.flights.iter().any(has_loop),
+                // Other messages than those of ROS 2.
+                Ok(Err(LogError::Empty)) => false,
+                _ => true,
+            }
+        }
+        found => found.is_some(),
+    }
 }
 
 /// Whether a source has the name of a flight log.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use onecycle::request::values::{
-    HOLDS, METHODS, beta, cutoff_hz, finite, noise, sample_rate, time_s, time_unit,
+    HOLDS, METHODS, beta, cutoff_hz, dbc, finite, noise, sample_rate, time_s, time_unit,
 };
 use onecycle::{ColumnRef, Hold, Method, Request, Structure};
 use onecycle_identify::MOST_CYCLES;
@@ -128,6 +128,9 @@ pub(crate) struct Identify {
     /// Unit of the time column: d, h, min, s, ms, us or ns [default: from its header]
     #[arg(long, help_heading = "Columns of a table", value_name = "UNIT", value_parser = time_unit)]
     pub(crate) time_unit: Option<TimeUnit>,
+    /// DBC file with the signals in the frames of a log of candump
+    #[arg(long, help_heading = "Columns of a table", value_name = "FILE")]
+    pub(crate) dbc: Option<PathBuf>,
 }
 
 impl Identify {
@@ -154,6 +157,10 @@ impl Identify {
         request.columns.control_loop.clone_from(&self.tag);
         request.columns.sample_rate_hz = self.sample_rate;
         request.columns.time_unit = self.time_unit;
+        let read = |path: &PathBuf| {
+            dbc(&path.to_string_lossy()).map_err(|reason| Failure::unreadable(path, reason))
+        };
+        request.columns.dbc = self.dbc.as_ref().map(read).transpose()?;
         request.axis = self.log.axis;
         request.control_loop = self.log.control_loop;
         request.flight = self.log.flight;

@@ -361,6 +361,7 @@ fn describe_controller(
     for (name, value) in controllers::forms(&design.controller, units)
         .into_iter()
         .chain(plant)
+        .chain(choice.device_model.clone())
     {
         wrapped(text, &format!("  {name:<11} "), &value);
     }

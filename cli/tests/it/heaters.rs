@@ -122,3 +122,70 @@ fn a_percent_is_not_taken_for_a_power_of_one() {
     let given = run(&[&asked[..], &["--input-range", "0..100"]].concat()).report();
     assert!(given.number("/process/k/estimate") > 0.0);
 }
+
+// 250 degrees of full power and a lag of 90 s: 2.78 degrees per second, cooling 1.11 degrees per second at 100 degrees; 6 s.
+#[test]
+fn a_printer_with_a_model_gets_its_model() {
+    let folder = Scratch::new();
+    let mut table = "time_s,power,temperature\n".to_owned();
+    for (time_s, power, temperature) in relay_test() {
+        let _ = writeln!(table, "{time_s},{power},{temperature}");
+    }
+    let table = folder.write("oven.csv", table.as_bytes());
+    let asked = [
+        "identify",
+        &table,
+        "--details",
+        "--structure",
+        "foptd",
+        "--input-range",
+        "0..1",
+        "--vendor",
+    ];
+    let text = run(&[&asked[..], &["marlin"]].concat()).stdout;
+    let line = text
+        .lines()
+        .find(|line| line.contains("M307 H1 R"))
+        .expect("a model");
+    let value = |letter: char| -> f64 {
+        let typed = line.split_once("M307").map_or("", |(_, typed)| typed);
+        let word = typed
+            .split_whitespace()
+            .find_map(|word| word.strip_prefix(letter));
+        word.and_then(|word| word.trim_end_matches(":0").parse().ok())
+            .expect("a number")
+    };
+    for (letter, expected, most) in [
+        ('R', 250.0 / 90.0, 0.03),
+        ('K', 100.0 / 90.0, 0.1),
+        ('D', 6.0, 0.3),
+    ] {
+        assert!((value(letter) - expected).abs() < most, "{line}");
+    }
+    // kV 1/250 and kA 90/250 per degree.
+    let text = run(&[&asked[..5], &["--vendor", "wpilib"]].concat()).stdout;
+    let line = text
+        .lines()
+        .find(|line| line.contains("kV 0.00"))
+        .expect("a feed-forward");
+    assert!(
+        line.contains("feedforward kS 0 (no dry friction seen)") && line.contains(", kA 0.3"),
+        "{line}"
+    );
+    // A power of 0 to 1 is not taken for one of 0 to 127.
+    run(&["identify", &table, "--vendor", "marlin"])
+        .misused(&["the input only reaches 1", "--input-range 0..1"]);
+    let two = [
+        "identify",
+        &table,
+        "--details",
+        "--structure",
+        "soptd",
+        "--input-range",
+        "0..1",
+        "--vendor",
+        "marlin",
+    ];
+    let two = run(&two).stdout;
+    assert!(two.contains("takes one lag and a dead time"), "{two}");
+}

@@ -135,7 +135,7 @@ fn chosen_by(preview: &Preview, all_given: bool, by: Option<ChosenBy>) -> Chosen
     }
 }
 
-/// The columns that can be a signal: neither taken, nor a set-point, nor a status.
+/// The columns that can be a signal: with numbers, neither taken, nor a set-point, nor a status.
 fn free(preview: &Preview, taken: &[Option<usize>]) -> Vec<usize> {
     let is_other = |column: &usize| {
         let name = preview.names.as_ref().and_then(|names| names.get(*column));
@@ -145,6 +145,7 @@ fn free(preview: &Preview, taken: &[Option<usize>]) -> Vec<usize> {
     };
     (0..preview.width)
         .filter(|column| !taken.contains(&Some(*column)) && !is_other(column))
+        .filter(|&column| preview.column(column).any(f64::is_finite))
         .collect()
 }
 
@@ -340,18 +341,37 @@ fn single(found: Vec<usize>, role: Role, preview: &Preview) -> Result<Option<usi
     }
 }
 
-/// The column of dates, if it is free; else the first column, if the file has no header, the column is free, and its
+/// The column of dates, if it is free; else one that counts the rows; else the first column, if the file has no header, the column is free, and its
 /// values never decrease.
 fn unnamed_time(preview: &Preview, input: Option<usize>, output: Option<usize>) -> Option<usize> {
     let is_free = |column: &usize| ![input, output].contains(&Some(*column));
     if let Some(dates) = preview.date.filter(is_free) {
         return Some(dates);
     }
+    if let Some(counter) =
+        (0..preview.width).find(|column| is_free(column) && is_counter(preview, *column))
+    {
+        return Some(counter);
+    }
     let free = preview.names.is_none() && input != Some(0) && output != Some(0);
     let stamps = preview.column(0).filter(|stamp| !stamp.is_nan());
     let rises = stamps.clone().is_sorted();
     let changes = preview.width > 2 || stamps.clone().min_by(f64::total_cmp) != stamps.last();
     (free && rises && changes).then_some(0)
+}
+
+/// Whether a column counts the rows: `Cycle` of a trace of CODESYS, which is a time if no other column is one.
+fn is_counter(preview: &Preview, column: usize) -> bool {
+    const NAMES: [&str; 5] = ["cycle", "index", "sample", "no", "nr"];
+    let names = preview.names.as_deref().unwrap_or_default();
+    let is_named =
+        (names.get(column)).is_some_and(|name| NAMES.contains(&key(&name.bare).as_str()));
+    let values = preview.column(column);
+    is_named
+        && values
+            .clone()
+            .zip(values.skip(1))
+            .all(|(a, b)| b == a + 1.0)
 }
 
 fn unknown(role: Role, preview: &Preview) -> ReadError {

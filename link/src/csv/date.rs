@@ -4,7 +4,8 @@
 //! 2024-01-31T12:00:01.5+01:00   2024/01/31 12:00:01     year first, as ISO 8601 writes it
 //! 31.01.2024 12:00:01,5                                 with points the day is first
 //! 31/01/2024 12:00   1/31/24 12:00:01 PM                a number above 12 is the day
-//! 31-Jan-24 12:00:01.5                                  as the PI system writes it
+//! 31-Jan-24 12:00:01.5   31 Jan 2024 12:00              as the PI system writes it
+//! Wed Jan 31 12:00:01 2024                              as C writes it
 //! ```
 //!
 //! While all dates are the same, the order of day and month does not matter. It is settled by a number above 12, or by
@@ -150,6 +151,8 @@ impl Calendar {
 /// The date and time of day in a cell; `None` if it is anything else.
 pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     let text = std::str::from_utf8(number::bare(cell)).ok()?;
+    let named = with_named_month(text);
+    let text = named.as_deref().unwrap_or(text);
     let (date, of_day) = text.split_once(['T', 't', ' ', '_'])?;
     let mark = date.bytes().find(|byte| !byte.is_ascii_digit())?;
     let mut parts = date.split(char::from(mark));
@@ -182,11 +185,26 @@ pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     (is_date && exists).then_some(date)
 }
 
-/// `8:00:01`, `08:00:01,5`, `1:00:01 PM`: the time of day in a cell, or the time since a start, in ns. Two numbers are
+/// A date whose words are separated by blanks, as `31-Jan-2024 12:00:01`.
+fn with_named_month(text: &str) -> Option<String> {
+    let is_month = |word: &str| word.is_ascii() && month(word).is_some();
+    let words: Vec<&str> = text.split_ascii_whitespace().collect();
+    match words.as_slice() {
+        [day, name, year, of_day @ ..] if is_month(name) && digits(day, 2).is_some() => {
+            Some(format!("{day}-{name}-{year} {}", of_day.join(" ")))
+        }
+        [_, name, day, of_day, year] if is_month(name) && of_day.contains(':') => {
+            Some(format!("{day}-{name}-{year} {of_day}"))
+        }
+        _ => None,
+    }
+}
+
+/// `8:00:01`, `08:00:01:500`, `08:00:01,5`, `1:00:01 PM`: the time of day in a cell, or the time since a start, in ns. Two numbers are
 /// none: `8:00` may be minutes and seconds.
 pub(super) fn of_day(cell: &[u8]) -> Option<i64> {
     let text = std::str::from_utf8(number::bare(cell)).ok()?;
-    let has_seconds = text.bytes().filter(|&byte| byte == b':').count() == 2;
+    let has_seconds = matches!(text.bytes().filter(|&byte| byte == b':').count(), 2 | 3);
     has_seconds.then(|| of_day_ns(text))?
 }
 
@@ -249,6 +267,14 @@ fn of_day_ns(text: &str) -> Option<i64> {
             Some(clock) => (clock, Some(12)),
             None => (upper.as_str(), None),
         },
+    };
+    // Milliseconds behind a fourth colon are three digits.
+    let colon = clock.match_indices(':').nth(2).map(|(at, _)| at);
+    let clock = match colon {
+        Some(at) if clock.trim().len() == at + 4 => {
+            format!("{}.{}", &clock[..at], &clock[at + 1..])
+        }
+        _ => clock.to_owned(),
     };
     let (clock, fraction_ns) = match clock.trim().split_once(['.', ',']) {
         Some((clock, fraction)) => (clock, nanoseconds(fraction)?),

@@ -124,6 +124,29 @@ pub enum ReadError {
         /// Cells on this line.
         found: usize,
     },
+    /// The column of a signal is empty, or holds text alone.
+    #[error("{column} holds no number")]
+    NoNumber {
+        /// Column.
+        column: ColumnLabel,
+    },
+    /// Frames of a CAN bus without a description, or with that of other frames.
+    #[error(
+        "{}", if *.is_given { "the DBC file describes no frame of this log of candump" } else { "a log of candump holds bytes, and no DBC file says what they are" }
+    )]
+    NoDbc {
+        /// Whether there is a DBC file.
+        is_given: bool,
+    },
+    /// The frames of a log of candump have no times, or times since the frame before.
+    #[error("the frames of this log of candump have no times that count from one start")]
+    NoCanTimes,
+    /// A DBC file has a signal that cannot be read, or none.
+    #[error("the DBC file has no signal that can be read on line {line}")]
+    BadDbc {
+        /// Line in the DBC file, from 1.
+        line: usize,
+    },
     /// A cell is not a number.
     #[error("line {line}, {column}: \"{text}\" is not a number")]
     NotANumber {
@@ -338,9 +361,17 @@ fn possibilities(step: f64, units: &[TimeUnit]) -> String {
 /// Longest text that an error or a note quotes, in characters.
 const MOST_QUOTED: usize = 32;
 
+/// Text of a cell: UTF-8, or else Latin-1. The end may be cut within a letter.
+pub(super) fn decoded(text: &[u8]) -> String {
+    match std::str::from_utf8(text) {
+        Err(error) if error.error_len().is_some() => text.iter().copied().map(char::from).collect(),
+        _ => String::from_utf8_lossy(text).into_owned(),
+    }
+}
+
 /// Text from the file as an error may quote it: short, on one line, printable.
 pub(super) fn quoted(text: &[u8]) -> String {
-    let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST_QUOTED)]).into_owned();
+    let text = decoded(&text[..text.len().min(4 * MOST_QUOTED)]);
     let mut short: String = text
         .chars()
         .filter(|c| !c.is_control())

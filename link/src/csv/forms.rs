@@ -8,10 +8,13 @@
 //! Setpoint:100.00,Input:80.10,Output:30.00                           Arduino, sTune, QuickPID       labels.rs
 //! boiler,site=a temp=79.9,pwm=0.3 1710230400000000000                InfluxDB                       influx.rs
 //! LabVIEW Measurement ...                                            LabVIEW .lvm                   labview.rs
+//! (1710230400.000100) can0 101#0A0B                                  candump, with a DBC file       candump.rs, dbc.rs
 //! ```
 //! Each line of the log becomes one line of the table, empty where it holds no values, so that errors name the lines of the
 //! log. The names of the columns are those that occur in the first bytes of the log.
 
+mod candump;
+mod dbc;
 mod fields;
 mod influx;
 mod labels;
@@ -19,7 +22,9 @@ mod labview;
 mod printers;
 
 use std::io::{self, BufRead, BufReader, Read};
+use std::rc::Rc;
 
+use self::dbc::Dbc;
 use self::fields::Lines;
 use super::error::ReadError;
 use super::text::{HEAD_BYTES, Text};
@@ -39,14 +44,28 @@ struct Form {
     is_sparse: bool,
     /// Whether the words for input and output may be those of a controller.
     is_labelled: bool,
-    line: fn() -> Box<dyn Lines>,
+    line: fn(&Rc<Dbc>) -> Box<dyn Lines>,
 }
 
 /// Logs of printers whose firmware may leave out the power.
 const PRINTER: &str = "a log of a printer's temperatures";
+/// Logs of a CAN bus.
+const CANDUMP: &str = "a log of candump with its DBC file";
 
 /// All kinds; the first that fits is taken.
-const FORMS: [Form; 7] = [
+const FORMS: [Form; 8] = [
+    Form {
+        format: CANDUMP,
+        magic: b"(",
+        least_lines: 1,
+        least_percent: 0,
+        is_sparse: true,
+        is_labelled: false,
+        line: |dbc| {
+            let dbc = Rc::clone(dbc);
+            Box::new(move |line: &str| candump::signals(line, &dbc))
+        },
+    },
     Form {
         format: "a LabVIEW measurement file",
         magic: labview::MAGIC,
@@ -54,7 +73,7 @@ const FORMS: [Form; 7] = [
         least_percent: 0,
         is_sparse: false,
         is_labelled: false,
-        line: || Box::new(labview::Measurement::default()),
+        line: |_| Box::new(labview::Measurement::default()),
     },
     Form {
         format: "a log of Klipper",
@@ -63,7 +82,7 @@ const FORMS: [Form; 7] = [
         least_percent: 0,
         is_sparse: false,
         is_labelled: false,
-        line: || Box::new(printers::stats),
+        line: |_| Box::new(printers::stats),
     },
     Form {
         format: "a relay test of Klipper",
@@ -72,7 +91,7 @@ const FORMS: [Form; 7] = [
         least_percent: 90,
         is_sparse: true,
         is_labelled: false,
-        line: || {
+        line: |_| {
             let mut has_power = false;
             Box::new(move |line: &str| printers::relay_test(line, &mut has_power))
         },
@@ -84,7 +103,7 @@ const FORMS: [Form; 7] = [
         least_percent: 0,
         is_sparse: false,
         is_labelled: false,
-        line: || Box::new(printers::temperatures),
+        line: |_| Box::new(printers::temperatures),
     },
     Form {
         format: "a log of ESPHome",
@@ -93,7 +112,7 @@ const FORMS: [Form; 7] = [
         least_percent: 0,
         is_sparse: true,
         is_labelled: false,
-        line: || Box::new(labels::states),
+        line: |_| Box::new(labels::states),
     },
     Form {
         format: "InfluxDB line protocol",
@@ -102,7 +121,7 @@ const FORMS: [Form; 7] = [
         least_percent: 90,
         is_sparse: true,
         is_labelled: false,
-        line: || Box::new(influx::fields),
+        line: |_| Box::new(influx::fields),
     },
     Form {
         format: "lines of names and values",
@@ -111,7 +130,7 @@ const FORMS: [Form; 7] = [
         least_percent: 60,
         is_sparse: false,
         is_labelled: true,
-        line: || Box::new(labels::labels),
+        line: |_| Box::new(labels::labels),
     },
 ];
 
@@ -123,18 +142,30 @@ const FIRST_LINES: usize = 200;
 /// Longest line that is looked at, in bytes; longer ones hold no values.
 const LONGEST_LINE: usize = 1 << 16;
 
-/// The text of a log as a table, with a note about it; any other text as it is.
-pub(super) fn table(text: Text<'_>) -> Result<(Text<'_>, Option<Note>), ReadError> {
+/// The text of a log as a table, with a note about it; any other text as it is. `dbc` describes the frames of a log of candump.
+pub(super) fn table<'a>(
+    text: Text<'a>,
+    dbc: Option<&str>,
+) -> Result<(Text<'a>, Option<Note>), ReadError> {
+    let is_given = dbc.is_some();
+    let dbc = Rc::new(dbc.map_or_else(|| Ok(Dbc::default()), Dbc::parse)?);
+    let is_candump = candump::begins(&text.head)?;
     // Most tables have none of these marks.
     let has_marks = text
         .head
         .iter()
         .any(|&byte| matches!(byte, b':' | b'=' | b'>'));
-    let of_table = |form: &&Form| has_marks || !form.magic.is_empty();
+    let of_table = |form: &&Form| match is_candump {
+        true => form.format == CANDUMP,
+        false => form.format != CANDUMP && (has_marks || !form.magic.is_empty()),
+    };
     let Some((form, columns)) = FORMS.iter().filter(of_table).find_map(|form| {
-        let columns = form.columns(&text.head)?;
+        let columns = form.columns(&text.head, &dbc)?;
         Some((form, columns))
     }) else {
+        if is_candump {
+            return Err(ReadError::NoDbc { is_given });
+        }
         let lines = text.head.split(|&byte| byte == b'\n').count() as u64;
         return match text.head.starts_with(labview::MAGIC) {
             true => Err(ReadError::NoData { lines }),
@@ -151,7 +182,7 @@ pub(super) fn table(text: Text<'_>) -> Result<(Text<'_>, Option<Note>), ReadErro
     let rows = Rows {
         log: BufReader::new(Box::new(io::Cursor::new(text.head).chain(text.rest))),
         columns: columns.clone(),
-        line: (form.line)(),
+        line: (form.line)(&dbc),
         row: Vec::new(),
         sent: 0,
     };
@@ -175,12 +206,12 @@ pub(super) fn table(text: Text<'_>) -> Result<(Text<'_>, Option<Note>), ReadErro
 
 impl Form {
     /// The names of the columns, if the head of a text is that of such a log.
-    fn columns(&self, head: &[u8]) -> Option<Vec<String>> {
-        if !head.starts_with(self.magic) {
+    fn columns(&self, head: &[u8], dbc: &Rc<Dbc>) -> Option<Vec<String>> {
+        if !head.trim_ascii_start().starts_with(self.magic) {
             return None;
         }
         let mut columns: Vec<String> = Vec::new();
-        let mut line = (self.line)();
+        let mut line = (self.line)(dbc);
         let (mut found, mut filled) = (0, 0);
         let lines = head.split(|&byte| byte == b'\n');
         for text in lines.filter(|text| text.len() <= LONGEST_LINE) {

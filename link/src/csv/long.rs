@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::error::{ReadError, quoted};
+use super::error::{ReadError, decoded, quoted};
 use super::names::{Name, key};
 use super::options::{ColumnRef, CsvOptions};
 use super::tags::Signal;
@@ -28,6 +28,15 @@ struct Tagged {
     values: Vec<(f64, f64, u64)>,
 }
 
+/// The rows of a loop, and what they are.
+pub(super) struct Rows {
+    pub(super) rows: Vec<Woven>,
+    pub(super) notes: Vec<Note>,
+    pub(super) input: Name,
+    pub(super) output: Name,
+    pub(super) set_point: Option<Name>,
+}
+
 /// The tags of the signals of a loop.
 #[derive(Debug, Clone, Copy)]
 struct Chosen {
@@ -49,7 +58,7 @@ impl Values {
             None => {
                 self.index_of.insert(tag.to_vec(), self.tags.len());
                 self.tags.push(Tagged {
-                    name: quoted(tag),
+                    name: decoded(tag),
                     values: vec![],
                 });
                 self.tags.len() - 1
@@ -64,10 +73,7 @@ impl Values {
     }
 
     /// The rows of the chosen loop in order of time, and what was chosen.
-    pub(super) fn rows(
-        mut self,
-        options: &CsvOptions,
-    ) -> Result<(Vec<Woven>, Vec<Note>), ReadError> {
+    pub(super) fn rows(mut self, options: &CsvOptions) -> Result<Rows, ReadError> {
         let chosen = self.choose(options)?;
         let times = |tag: usize| self.tags[tag].values.iter().map(|value| value.0);
         let is_shared = times(chosen.input).eq(times(chosen.output));
@@ -98,7 +104,7 @@ impl Values {
             }
         }
         rows.extend(weave.finish());
-        let name = |tag: usize| self.tags[tag].name.clone();
+        let name = |tag: usize| quoted(self.tags[tag].name.as_bytes());
         let mut notes = vec![Note::TagsChosen {
             input: name(chosen.input),
             output: name(chosen.output),
@@ -110,7 +116,14 @@ impl Values {
                 outputs: weave.outputs,
             });
         }
-        Ok((rows, notes))
+        let name = |tag: usize| Name::parse(&self.tags[tag].name);
+        Ok(Rows {
+            rows,
+            notes,
+            input: name(chosen.input),
+            output: name(chosen.output),
+            set_point: chosen.set_point.map(name),
+        })
     }
 
     fn choose(&self, options: &CsvOptions) -> Result<Chosen, ReadError> {
@@ -119,6 +132,7 @@ impl Values {
             Some(ColumnRef::Name(wanted)) => (names.iter())
                 .position(|name| name.full == *wanted)
                 .or_else(|| names.iter().position(|name| key(&name.full) == key(wanted)))
+                .or_else(|| names.iter().position(|name| key(&name.bare) == key(wanted)))
                 .map(Some)
                 .ok_or_else(|| self.unknown(role)),
             // Tags have no numbers.
@@ -158,6 +172,11 @@ impl Values {
             input.or_else(|| left(output)),
             output.or_else(|| left(input)),
         );
+        if let (Some(input), Some(output), None) = (input, output, options.input_column.as_ref())
+            && names[input].may_be_crossed(&names[output])
+        {
+            return Err(self.unknown(Role::Input));
+        }
         Ok(Chosen {
             input: input.ok_or_else(|| self.unknown(Role::Input))?,
             output: output.ok_or_else(|| self.unknown(Role::Output))?,
@@ -168,7 +187,11 @@ impl Values {
     fn unknown(&self, role: Role) -> ReadError {
         ReadError::UnknownTag {
             role,
-            tags: self.tags.iter().map(|tag| tag.name.clone()).collect(),
+            tags: self
+                .tags
+                .iter()
+                .map(|tag| quoted(tag.name.as_bytes()))
+                .collect(),
         }
     }
 }
@@ -224,6 +247,15 @@ impl Loop {
                 }
             };
             at.signals[tag.signal as usize].get_or_insert(column);
+        }
+        // `PID_1.Input` beside `PID_1.Output` is what the controller measures.
+        for (column, name) in names.iter().enumerate() {
+            let is_crossed = |of: &&mut Self| {
+                (of.of(Signal::Input)).is_some_and(|output| names[output].is_pair(name))
+            };
+            if let Some(of) = all.iter_mut().find(is_crossed) {
+                of.signals[Signal::Output as usize].get_or_insert(column);
+            }
         }
         all
     }

@@ -166,12 +166,22 @@ fn is_of_controller(
             .get(column)
             .is_some_and(|name| key(&name.bare) == wanted)
     };
-    if !(is_named(columns[0], "input") && is_named(columns[1], "output")) {
-        return Ok(false);
-    }
     let doubt = || ReadError::InputOfWhat {
         columns: columns.map(|column| preview.label(column)),
     };
+    if let (Some(input), Some(output)) = (names.get(columns[0]), names.get(columns[1]))
+        && input.may_be_crossed(output)
+    {
+        // `Output` of a block is what acts, if it is that of a controller: its `Input` follows the set-point.
+        let near = |column| set_point.map(|set_point| Nearness::of(preview, column, set_point));
+        return match (near(columns[1]), near(columns[0])) {
+            (Some(measured), Some(acts)) if measured.is_near_unlike(&acts) => Ok(false),
+            _ => Err(doubt()),
+        };
+    }
+    if !(is_named(columns[0], "input") && is_named(columns[1], "output")) {
+        return Ok(false);
+    }
     let Some(set_point) = set_point else {
         return if preview.is_labelled {
             Err(doubt())

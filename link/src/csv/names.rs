@@ -1,11 +1,12 @@
 //! Column names: their units and the signals they stand for.
 
 use super::tags::{self, Signal, Tag};
+use super::words;
 use crate::recording::{Column, Role};
 use crate::time_unit::TimeUnit;
 
 /// Usual names of the time, in lower case, words joined by `_`, without unit.
-const TIME: [&str; 24] = [
+const TIME: [&str; 33] = [
     "t",
     "time",
     "timestamp",
@@ -30,6 +31,15 @@ const TIME: [&str; 24] = [
     "x_value",
     "millis",
     "micros",
+    "zeit",
+    "zeitstempel",
+    "datum",
+    "uhrzeit",
+    "temps",
+    "horodatage",
+    "tiempo",
+    "fecha",
+    "tempo",
 ];
 
 /// Usual names of the input of the process.
@@ -197,75 +207,8 @@ const UNITS: [&str; 91] = [
     "degrees",
 ];
 
-/// Words of names that tell the input of a process: what acts. They count only where no usual name tells.
-const ACTS: [&str; 25] = [
-    "heater",
-    "heating",
-    "power",
-    "duty",
-    "pwm",
-    "valve",
-    "pump",
-    "throttle",
-    "volt",
-    "volts",
-    "voltage",
-    "actuator",
-    "relay",
-    "switch",
-    "cmd",
-    "command",
-    "burner",
-    "effort",
-    "op",
-    "mv",
-    "co",
-    "dac",
-    "ventil",
-    "stellwert",
-    "stellgr\u{f6}\u{df}e",
-];
-/// Words of names that tell the output of a process: what is measured.
-const MEASURED: [&str; 25] = [
-    "temperature",
-    "temp",
-    "level",
-    "pressure",
-    "flow",
-    "speed",
-    "velocity",
-    "position",
-    "angle",
-    "humidity",
-    "thermocouple",
-    "probe",
-    "rpm",
-    "height",
-    "ph",
-    "encoder",
-    "pv",
-    "adc",
-    "measured",
-    "actual",
-    "feedback",
-    "temperatur",
-    "druck",
-    "drehzahl",
-    "istwert",
-];
-/// Words of names that tell a set-point.
-const WANTED: [&str; 8] = [
-    "setpoint",
-    "target",
-    "desired",
-    "reference",
-    "sp",
-    "sollwert",
-    "soll",
-    "wanted",
-];
-/// Words of names that say that an `output` or `out` is that of a controller.
-const CONTROLS: [&str; 6] = ["pid", "controller", "control", "ctrl", "regler", "loop"];
+/// Words before a letter that is a label, not a unit.
+const LABELLED: [&str; 6] = ["channel", "ch", "kanal", "canal", "voie", "probe"];
 
 /// A name in a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -281,7 +224,10 @@ pub(super) struct Name {
 impl Name {
     /// Splits `pv [rad]`, `time (ms)`, `t / s`, `u_N` or `TimeUS` into name and unit.
     pub(super) fn parse(cell: &str) -> Self {
-        let full = cell.trim().trim_matches(['"', '\'']).trim().to_owned();
+        let trimmed = cell.trim();
+        let quotes = |mark| trimmed.strip_prefix(mark)?.strip_suffix(mark);
+        let full = quotes('"').or_else(|| quotes('\'')).unwrap_or(trimmed);
+        let full = full.trim().to_owned();
         // In `LIC101.MV` the last word is no unit.
         let is_tag = tags::parse(&full).is_some();
         let marked = || after_mark(&full).filter(|_| !is_tag);
@@ -344,19 +290,20 @@ impl Name {
     /// The signal that the words of the name tell, where it is no usual name: the last word that tells one, so
     /// that `heater_temperature` is a temperature; a set-point in any place.
     pub(super) fn told(&self) -> Option<Signal> {
-        let words = words(&self.bare);
-        let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
-        if has(&WANTED) || key(&self.bare).contains("set_point") {
-            return Some(Signal::SetPoint);
-        }
-        if has(&["output", "out"]) && has(&CONTROLS) {
-            return Some(Signal::Input);
-        }
-        words.iter().rev().find_map(|word| match word.as_str() {
-            word if ACTS.contains(&word) => Some(Signal::Input),
-            word if MEASURED.contains(&word) => Some(Signal::Output),
-            _ => None,
-        })
+        words::told(&self.bare)
+    }
+
+    /// Whether `motor.output` was taken for the input and `motor.input` for the output, though no word says that they are those of a
+    /// controller.
+    pub(super) fn may_be_crossed(&self, output: &Self) -> bool {
+        self.is_pair(output) && !words::is_of_controller(&self.bare)
+    }
+
+    /// Whether this is the output of a block and the other name its input: `PID_1.Output` and `PID_1.Input`.
+    pub(super) fn is_pair(&self, input: &Self) -> bool {
+        let [own, other] = [self, input].map(|name| key(&name.bare));
+        let stem = own.strip_suffix("_output");
+        stem.is_some() && stem == other.strip_suffix("_input")
     }
 
     /// The unit of time that the name gives, also in names such as `seconds` or `millis`.
@@ -392,28 +339,6 @@ pub(super) fn key(name: &str) -> String {
     words.collect::<Vec<_>>().join("_")
 }
 
-/// The words of a name in lower case, without digits at their ends: `fTemp` is `f` and `temp`.
-fn words(name: &str) -> Vec<String> {
-    let mut words = vec![String::new()];
-    let mut was_lower = false;
-    for c in name.chars() {
-        let is_new = !c.is_alphanumeric() || (was_lower && c.is_uppercase());
-        if is_new {
-            words.push(String::new());
-        }
-        was_lower = c.is_lowercase();
-        if let Some(word) = words.last_mut().filter(|_| c.is_alphanumeric()) {
-            word.extend(c.to_lowercase());
-        }
-    }
-    let bare = words
-        .iter()
-        .map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
-    bare.filter(|word| !word.is_empty())
-        .map(str::to_owned)
-        .collect()
-}
-
 pub(super) fn is_known_unit(unit: &str) -> bool {
     // In names such as `y_d` the letter stands for "desired" or "derivative".
     if unit.eq_ignore_ascii_case("d") {
@@ -441,7 +366,9 @@ fn after_mark(name: &str) -> Option<(&str, &str)> {
         .filter(|(_, c)| matches!(c, '/' | ',' | '_' | ' ' | '.'));
     for (at, mark) in marks {
         let parts = (&name[..at], &name[at + mark.len_utf8()..]);
-        if split(parts) {
+        // `Channel A` is no current.
+        let is_label = LABELLED.contains(&key(parts.0).as_str());
+        if split(parts) && !is_label {
             return Some((parts.0.trim(), parts.1.trim()));
         }
     }

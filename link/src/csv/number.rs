@@ -30,7 +30,7 @@ pub(super) enum Mark {
 }
 
 /// What logs write for a missing number, in lower case.
-const MISSING: [&str; 20] = [
+const MISSING: [&str; 25] = [
     "",
     "nan",
     "+nan",
@@ -48,6 +48,11 @@ const MISSING: [&str; 20] = [
     "-inf",
     "infinity",
     "-infinity",
+    "--",
+    "---",
+    "----",
+    "***",
+    "****",
     // What a channel of an oscilloscope beyond its range has.
     "\u{221e}",
     "+\u{221e}",
@@ -55,7 +60,14 @@ const MISSING: [&str; 20] = [
 ];
 
 /// Words of two-valued signals, in lower case, and their numbers.
-const SWITCHES: [(&str, f64); 4] = [("on", 1.0), ("off", 0.0), ("true", 1.0), ("false", 0.0)];
+const SWITCHES: [(&str, f64); 6] = [
+    ("on", 1.0),
+    ("off", 0.0),
+    ("true", 1.0),
+    ("false", 0.0),
+    ("ein", 1.0),
+    ("aus", 0.0),
+];
 
 /// How the words begin that historians and control systems write for a sample that is no good, in lower case: digital
 /// states of the PI system, status of OPC, errors of Excel. An interpolated sample was not measured.
@@ -112,7 +124,7 @@ const POWERS: [f64; 23] = [
 pub(super) fn parse(cell: &[u8]) -> Cell {
     let cell = bare(cell);
     let Some(decimal) = Decimal::scan(cell) else {
-        return match ungrouped(cell, None) {
+        return match ascii(cell).or_else(|| ungrouped(cell, None)) {
             Some(plain) => parse(&plain),
             None if is_missing(cell) => Cell::Missing,
             None if is_bad(cell) => Cell::Bad,
@@ -124,6 +136,20 @@ pub(super) fn parse(cell: &[u8]) -> Cell {
         Some(_) => Cell::Missing,
         None => Cell::Text,
     }
+}
+
+/// A cell without the hard blanks around it, and with a hyphen for a minus sign; `None` if it has neither.
+fn ascii(cell: &[u8]) -> Option<Vec<u8>> {
+    if cell.is_ascii() {
+        return None;
+    }
+    let text = std::str::from_utf8(cell).ok()?;
+    let plain = text.trim();
+    let plain = match plain.strip_prefix('\u{2212}') {
+        Some(size) => format!("-{size}"),
+        None => plain.to_owned(),
+    };
+    (plain != text).then(|| plain.into_bytes())
 }
 
 /// The number of a two-valued signal: 1 of `on` and `true`, 0 of `off` and `false`.

@@ -36,6 +36,8 @@ pub struct CsvOptions {
     pub sample_rate_hz: Option<f64>,
     /// Unit of the time column; overrules the header.
     pub time_unit: Option<TimeUnit>,
+    /// Text of the DBC file that describes the frames of a log of candump.
+    pub dbc: Option<String>,
     /// Maximum number of points to keep; a longer recording is averaged. Default [`MAX_POINTS`].
     pub max_points: usize,
 }
@@ -50,6 +52,7 @@ impl Default for CsvOptions {
             control_loop: None,
             sample_rate_hz: None,
             time_unit: None,
+            dbc: None,
             max_points: MAX_POINTS,
         }
     }

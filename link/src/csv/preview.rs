@@ -1,7 +1,7 @@
 //! Preview of a table: its header and its first rows.
 
 use super::date;
-use super::error::{ReadError, quoted};
+use super::error::{ReadError, decoded, quoted};
 use super::long::Activity;
 use super::names::{Name, is_unit, key};
 use super::number::{self, Cell};
@@ -175,6 +175,12 @@ impl Preview {
             }
             names
         });
+        let groups = header.map_or_else(Vec::new, |at| shape::groups(&leading[at].cells, width));
+        let above = header.and_then(|at| leading.get(at.checked_sub(1)?));
+        let names = names.map(|names| match above {
+            Some(above) => shape::names_above(names, &groups, &above.cells),
+            None => names,
+        });
         let skipped = header.unwrap_or(leading.len());
         if width < 2 {
             return Err(ReadError::OneColumn { line });
@@ -190,7 +196,7 @@ impl Preview {
             split: split(&cells[..width]),
             tags: vec![],
             value: None,
-            groups: header.map_or_else(Vec::new, |at| shape::groups(&leading[at].cells, width)),
+            groups,
             ramp: ramp.map(|(_, start, step)| (start, step)),
             is_labelled: false,
             thousands: None,
@@ -249,7 +255,10 @@ impl Preview {
         if cells.len() != self.width || cells.iter().any(|cell| is_number(cell)) {
             return;
         }
-        let names: Vec<Name> = cells.iter().map(|cell| Name::parse(&words(cell))).collect();
+        let names: Vec<Name> = cells
+            .iter()
+            .map(|cell| Name::parse(&decoded(cell)))
+            .collect();
         if names.iter().any(|name| name.role().is_some()) {
             self.names = Some(names);
             self.comment_line = Some(line);
@@ -407,7 +416,7 @@ struct Leading {
 impl Leading {
     fn of<'a>(cells: impl Iterator<Item = &'a [u8]>) -> Self {
         Self {
-            cells: cells.map(words).collect(),
+            cells: cells.map(decoded).collect(),
         }
     }
 
@@ -483,10 +492,6 @@ impl Leading {
     }
 }
 
-fn words(cell: &[u8]) -> String {
-    String::from_utf8_lossy(cell).into_owned()
-}
-
 fn is_number(cell: &[u8]) -> bool {
     matches!(number::parse(cell), Cell::Number(..))
 }
@@ -494,8 +499,15 @@ fn is_number(cell: &[u8]) -> bool {
 /// Whether a row is data: it holds a number, also one with its unit behind a time, or only words for a missing number such as NaN.
 fn is_data<'a>(cells: impl Iterator<Item = &'a [u8]> + Clone) -> bool {
     let filled = cells.filter(|cell| !number::bare(cell).is_empty());
-    let is_missing = |cell: &[u8]| matches!(number::parse(cell), Cell::Missing | Cell::Bad);
-    let begins_with_time = filled.clone().next().is_some_and(is_time);
+    // A line of dashes under a header is none.
+    let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || !byte.is_ascii();
+    let is_missing = |cell: &[u8]| {
+        cell.iter().any(is_word) && matches!(number::parse(cell), Cell::Missing | Cell::Bad)
+    };
+    let is_duration =
+        |cell| number::with_unit(cell).is_some_and(|(_, unit)| TimeUnit::from_name(unit).is_some());
+    let begins_with_time =
+        (filled.clone().next()).is_some_and(|cell| is_time(cell) || is_duration(cell));
     filled.clone().any(is_number)
         || (begins_with_time && filled.clone().any(|cell| number::with_unit(cell).is_some()))
         || (filled.clone().next().is_some() && filled.clone().all(is_missing))

@@ -11,6 +11,10 @@
 //!
 //! Name  fOut  Name  fTemp        a word that repeats in the header: from there to the next, columns of one time
 //! 0     30    0     80
+//!
+//! fOut         fTemp             the same with titles above
+//! Time  Value  Time  Value
+//! 0     30     0     80
 //! ```
 
 use std::collections::HashSet;
@@ -18,6 +22,7 @@ use std::ops::Range;
 
 use super::date::{self, Calendar};
 use super::error::ReadError;
+use super::names::Name;
 use super::number::{self, Cell, Mark};
 use super::records::Records;
 use super::separator::Separator;
@@ -88,6 +93,31 @@ pub(super) fn groups(header: &[String], width: usize) -> Vec<Group> {
     } else {
         vec![]
     }
+}
+
+/// The names of columns; where those of groups are alike (`Time;Value;Time;Value`), from the row of titles above them.
+pub(super) fn names_above(mut names: Vec<Name>, groups: &[Group], above: &[String]) -> Vec<Name> {
+    let title = |group: &Group| {
+        let cells = above.get(group.time..group.values.end.min(above.len()))?;
+        cells
+            .iter()
+            .map(|cell| cell.trim())
+            .find(|cell| !cell.is_empty())
+    };
+    let one = |group: &Group| (group.values.len() == 1).then_some(group.values.start);
+    let values: Option<Vec<usize>> = groups.iter().map(one).collect();
+    let titles: Option<Vec<&str>> = groups.iter().map(title).collect();
+    let (Some(values), Some(titles)) = (values, titles) else {
+        return names;
+    };
+    let are_alike = values
+        .windows(2)
+        .all(|pair| names[pair[0]].full == names[pair[1]].full);
+    for (column, title) in values.into_iter().zip(titles).filter(|_| are_alike) {
+        names[column] =
+            Name::parse(title).with_unit(names[column].unit.as_deref().unwrap_or_default());
+    }
+    names
 }
 
 /// What the cells of each column are, in the first rows.

@@ -58,7 +58,12 @@ impl Sheet {
                     byte
                 }
             };
+            // A line that begins with one of these is a comment.
+            let is_comment = at == 0 && cell.as_ref().starts_with(['#', '%', '/', ';']);
+            let quote: &[u8] = if is_comment { b"\"" } else { b"" };
+            self.text.extend_from_slice(quote);
             self.text.extend(cell.as_ref().as_bytes().iter().map(plain));
+            self.text.extend_from_slice(quote);
         }
         self.text.push(b'\n');
     }

@@ -257,13 +257,27 @@ impl<'a> Table<'a> {
     /// The recording.
     pub(super) fn finish(mut self, options: &CsvOptions) -> Result<Recording, ReadError> {
         if let Some(values) = self.values.take() {
-            let (rows, notes) = values.rows(options)?;
-            notes.into_iter().for_each(|note| self.builder.note(note));
+            let of = values.rows(options)?;
+            of.notes
+                .into_iter()
+                .for_each(|note| self.builder.note(note));
             self.builder.mark_own_stamps();
-            for row in rows {
+            // A unit behind the numbers is that of all tags.
+            let unit = self.preview.unit(self.choice.output).unwrap_or_default();
+            let signals = [Some(of.input), Some(of.output), of.set_point];
+            let [input, output, set_point] =
+                signals.map(|name| Some(name?.with_unit(unit).column()));
+            if let (Some(input), Some(output)) = (input, output) {
+                self.builder.name_signals(input, output, set_point);
+            }
+            for row in of.rows {
                 self.push_woven(&row, Stamp::Real(row.time_s))?;
             }
         }
+        let chosen = [self.choice.input, self.choice.output].into_iter();
+        let empty = chosen
+            .filter(|_| !self.preview.has_own_stamps())
+            .find(|column| !self.preview.column(*column).any(f64::is_finite));
         if let Some(mut weave) = self.weave.take() {
             self.builder.mark_own_stamps();
             if let Some(last) = weave.finish() {
@@ -274,10 +288,14 @@ impl<'a> Table<'a> {
                 outputs: weave.outputs,
             });
         }
-        let recording = self
-            .builder
-            .finish()?
-            .with_relay_beta(self.preview.relay_beta);
+        let recording = match self.builder.finish() {
+            Err(RecordingError::TooShort { .. }) if empty.is_some() => {
+                return Err(ReadError::NoNumber {
+                    column: self.preview.label(empty.unwrap_or_default()),
+                });
+            }
+            finished => finished?.with_relay_beta(self.preview.relay_beta),
+        };
         match self.doubt {
             Some(doubt) => Err(doubt),
             None => Ok(recording),
@@ -340,7 +358,12 @@ impl<'a> Table<'a> {
             let time_s = start + step * count;
             return Ok((Stamp::Real(time_s), time_s));
         }
-        let Some((stamp, mark)) = clock::parse(&cell) else {
+        // `0.5 s`, as dashboards write it.
+        let in_unit = || {
+            let (number, unit) = number::with_unit(&cell)?;
+            clock::parse(number).filter(|_| self.preview.unit(column) == Some(unit))
+        };
+        let Some((stamp, mark)) = clock::parse(&cell).or_else(in_unit) else {
             let (line, column) = (row.line, self.preview.label(column));
             let text = quoted(&cell);
             return Err(match number::is_clock_time(&cell) {

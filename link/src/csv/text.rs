@@ -60,11 +60,14 @@ pub(super) struct Text<'a> {
 impl<'a> Text<'a> {
     /// Reads the head of a file.
     pub(super) fn open(mut file: impl Read + 'a) -> Result<Self, ReadError> {
-        let start = take(&mut file, 4)?;
+        let start = take(&mut file, 8)?;
         let (skip, big_endian) = match *start {
             [0xef, 0xbb, 0xbf, ..] => (3, None),
             [0xff, 0xfe, ..] => (2, Some(false)),
             [0xfe, 0xff, ..] => (2, Some(true)),
+            // Without a mark: four letters of ASCII.
+            [a, 0, b, 0, c, 0, d, 0] if is_letters([a, b, c, d]) => (0, Some(false)),
+            [0, a, 0, b, 0, c, 0, d] if is_letters([a, b, c, d]) => (0, Some(true)),
             _ => (0, None),
         };
         let file = io::Cursor::new(start).chain(file);
@@ -97,6 +100,12 @@ impl<'a> Text<'a> {
             is_labelled: false,
         })
     }
+}
+
+fn is_letters(bytes: [u8; 4]) -> bool {
+    bytes
+        .iter()
+        .all(|byte| byte.is_ascii_graphic() || b" \t".contains(byte))
 }
 
 /// Up to `count` bytes; fewer only at the end of the file.

@@ -1,7 +1,7 @@
 //! The unit of a time column that does not state it.
 //!
 //! A reading of the stamps is possible if its sample period lies between 0.2 ms and 60 s and it starts within 115 days
-//! of zero. Stamps of the years 2000 to 2100, counted from 1970, show their unit by their size. If more than one reading
+//! of zero; steps such as 1/60 may be minutes or hours. Stamps of the years 2000 to 2100, counted from 1970, show their unit by their size. If more than one reading
 //! is possible, or none, the unit is in doubt: a unit that is wrong makes every time constant wrong by its factor.
 
 use std::ops::{Range, RangeInclusive};
@@ -17,6 +17,8 @@ const PERIODS_S: RangeInclusive<f64> = 2e-4..=60.0;
 const EPOCH_S: Range<f64> = 946_684_800.0..4_102_444_800.0;
 /// The years 2000 to 2100 in days, as Excel (since 1900) and MATLAB (since year 0) count them.
 const SERIAL_DAYS: [Range<f64>; 2] = [36_526.0..73_051.0, 730_486.0..767_011.0];
+/// The years 2000 to 2100 in 100 ns since 1601, as Windows counts (FILETIME).
+const WINDOWS_TICKS: Range<f64> = 1.259_115_84e17..1.574_691_84e17;
 /// Units of stamps that count from a start nearby, each with the sample period from which it is the usual one (in units):
 /// logs of 1 Hz to 1 kHz.
 const COUNTED: [(TimeUnit, f64); 4] = [
@@ -37,7 +39,8 @@ pub(super) struct Found {
 /// The unit of a time column: as the caller says, else as its header says, else by its stamps.
 pub(super) fn find(preview: &Preview, column: usize, forced: Option<TimeUnit>) -> Found {
     let name = preview.names.as_ref().and_then(|names| names.get(column));
-    let stated = forced.or_else(|| name.and_then(|name| name.time_unit()));
+    let in_cells = || preview.unit(column).and_then(TimeUnit::from_name);
+    let stated = forced.or_else(|| name.and_then(|name| name.time_unit()).or_else(in_cells));
     if let Some(unit) = stated {
         let note = (unit != TimeUnit::Seconds).then_some(Note::TimeUnit { unit });
         return Found {
@@ -92,6 +95,9 @@ fn readings(first: f64, step: f64, is_whole: bool) -> (TimeUnit, Vec<TimeUnit>) 
     {
         return (unit, vec![unit]);
     }
+    if WINDOWS_TICKS.contains(&first) {
+        return (TimeUnit::Ticks, vec![TimeUnit::Ticks]);
+    }
     if step < 1.0 && !is_whole {
         return fractions(first, step);
     }
@@ -125,16 +131,28 @@ fn fractions(first: f64, step: f64) -> (TimeUnit, Vec<TimeUnit>) {
         // A time of day, or a duration: 1 s of 86,400 s is no round number of seconds.
         days_are_usual && is_multiple(1.0)
     };
+    // So is 1 s of 60 s or of 3600 s; 60 Hz is 1/60 s too.
+    let is_odd = (step - format!("{step:.2e}").parse().unwrap_or(step)).abs() > 1e-4 * step;
+    let counts_seconds = |unit: &TimeUnit| {
+        let times = unit.seconds(step);
+        is_odd && times >= 0.999 && (times - times.round()).abs() < 1e-4 * times
+    };
+    let longer: Vec<TimeUnit> = [TimeUnit::Minutes, TimeUnit::Hours]
+        .into_iter()
+        .filter(counts_seconds)
+        .collect();
     match (days_are_possible, is_date && days_are_usual) {
         (true, true) => (days, vec![days]),
         (true, false) => (days, vec![days, seconds]),
-        (false, _) => (seconds, vec![seconds]),
+        (false, _) => (seconds, [vec![seconds], longer].concat()),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::TimeUnit::{Days, Microseconds, Milliseconds, Nanoseconds, Seconds};
+    use super::TimeUnit::{
+        Days, Hours, Microseconds, Milliseconds, Minutes, Nanoseconds, Seconds, Ticks,
+    };
     use super::*;
 
     #[track_caller]
@@ -164,6 +182,17 @@ mod tests {
         assert_units(0.0, 1.0 / 86_400.0, &[Days, Seconds], Days);
     }
 
+    // 1 s in minutes is 60 Hz in seconds; 0.1 min is no sign of minutes.
+    #[test]
+    fn minutes_and_hours_are_doubted() {
+        assert_units(0.0, 1.0 / 60.0, &[Minutes, Hours, Seconds], Seconds);
+        assert_units(0.0, 0.016667, &[Minutes, Hours, Seconds], Seconds);
+        assert_units(0.0, 1.0 / 7.0, &[Seconds], Seconds);
+        assert_units(0.0, 1.0 / 3600.0, &[Hours, Seconds], Seconds);
+        assert_units(0.0, 0.1, &[Seconds], Seconds);
+        assert_units(0.0, 1.0 / 70.0, &[Seconds], Seconds);
+    }
+
     #[test]
     fn whole_numbers_from_a_start_nearby() {
         assert_units(0.0, 1.0, &[Milliseconds, Seconds], Seconds);
@@ -186,7 +215,6 @@ mod tests {
         assert_units(1.7e18, 1e6, &[Nanoseconds], Nanoseconds);
         // 1500 s after power-up in us or 17 days in ms, not the year 2017 with a sample period of 42 min.
         assert_units(1.5e9, 2500.0, &[Microseconds, Milliseconds], Microseconds);
-        // 100 ns since 1601, as Windows counts: no unit fits.
-        assert_units(1.33e17, 1e5, &[], Seconds);
+        assert_units(1.33e17, 1e5, &[Ticks], Ticks);
     }
 }

@@ -1,4 +1,4 @@
-//! MCAP with messages of ROS 2 (`ros2 bag`, Foxglove): topics of PX4 as the package `px4_msgs` defines them.
+//! MCAP with messages of ROS 2 (`ros2 bag`, Foxglove): topics of PX4 as the package `px4_msgs` defines them, and any with numbers.
 //!
 //! ```text
 //! 89 "MCAP0" 0D 0A
@@ -6,8 +6,8 @@
 //! chunk                               records again: as they are, zstd or lz4
 //! ```
 //! Schemas are `ros2msg`, messages CDR, little-endian. The name of a table is that of the topic behind the last `/`, without
-//! the version that PX4 appends (`_v1`), so that it is the name in a ULog. Times are the column `timestamp` (us), or when
-//! the message was recorded. Reference: MCAP format specification, version 0; OMG DDS-XTYPES 1.3, section 7.4.1 (CDR).
+//! the version that PX4 appends (`_v1`), so that it is the name in a ULog. Times are the column `timestamp` (us), the stamp of
+//! the header if it has the clock of the recorder, or when the message was recorded. Reference: MCAP format specification, version 0; OMG DDS-XTYPES 1.3, section 7.4.1 (CDR).
 
 mod cdr;
 
@@ -31,6 +31,10 @@ const MOST_UNPACKED: u64 = 1 << 28;
 const MOST_TEXT: usize = 1 << 24;
 const MOST_COLUMNS: usize = 1 << 20;
 
+/// A header whose time is nearer than this to that of the recorder has its clock, not that of a simulation: signals of other topics, which
+/// may have no header, are on it too.
+const SAME_CLOCK_US: f64 = 1e6;
+
 /// Kinds of records.
 const FOOTER: u8 = 2;
 const SCHEMA: u8 = 3;
@@ -50,6 +54,7 @@ pub(super) fn read(mut source: Source<impl Read>, wanted: &Wanted) -> Result<Log
         channels: HashMap::new(),
         columns: 0,
         row: Vec::new(),
+        labels: Vec::new(),
         flight: FlightTables::default(),
         loss: Loss::default(),
     };
@@ -67,6 +72,10 @@ struct Channel {
     /// Index of the topic.
     topic: usize,
     layout: Layout,
+    /// Of the first message; where they are others, its columns would be other signals.
+    labels: Option<Vec<String>>,
+    /// Whether the header has the clock of the recorder.
+    has_stamp: bool,
 }
 
 struct Reader<'a> {
@@ -77,8 +86,9 @@ struct Reader<'a> {
     /// `None`: its messages are not of ROS 2, or their schema is not known.
     channels: HashMap<u16, Option<Channel>>,
     columns: usize,
-    /// Values of a message.
+    /// Values of a message, and labels of its sequences.
     row: Vec<f64>,
+    labels: Vec<String>,
     flight: FlightTables,
     loss: Loss,
 }
@@ -239,6 +249,8 @@ impl Reader<'_> {
                 Channel {
                     topic: self.flight.topics.len() - 1,
                     layout,
+                    labels: None,
+                    has_stamp: false,
                 }
             })
         });
@@ -256,7 +268,7 @@ impl Reader<'_> {
             self.loss.rows_dropped += 1;
             return;
         };
-        let channel = match self.channels.get(&(id as u16)) {
+        let channel = match self.channels.get_mut(&(id as u16)) {
             Some(Some(channel)) => channel,
             Some(None) => return,
             None => {
@@ -264,14 +276,31 @@ impl Reader<'_> {
                 return;
             }
         };
-        if channel.layout.read(fields.0, &mut self.row).is_none() {
+        let (row, labels) = (&mut self.row, &mut self.labels);
+        if channel.layout.read(fields.0, row, labels).is_none() {
             self.loss.rows_dropped += 1;
             return;
         }
-        let own_us = channel.layout.timestamp.map(|at| self.row[at]);
+        let stamp_us =
+            (channel.layout.stamp).map(|[seconds, rest]| row[seconds] * 1e6 + row[rest] * 1e-3);
+        let recorded_us = recorded_ns as f64 * 1e-3;
+        if channel.labels.is_none() {
+            self.flight.topics[channel.topic].fields = channel.layout.labelled(labels);
+            channel.labels = Some(labels.clone());
+            channel.has_stamp =
+                stamp_us.is_some_and(|stamp_us| (stamp_us - recorded_us).abs() < SAME_CLOCK_US);
+        }
+        if channel.labels.as_ref() != Some(labels) {
+            self.loss.rows_dropped += 1;
+            return;
+        }
+        let own_us = channel
+            .layout
+            .timestamp
+            .map(|at| row[at])
+            .or(stamp_us.filter(|_| channel.has_stamp));
         let time_us = own_us.filter(|time_us| *time_us > 0.0);
-        let time_us = time_us.unwrap_or(recorded_ns as f64 * 1e-3);
-        let row = &self.row;
+        let time_us = time_us.unwrap_or(recorded_us);
         self.flight.topics[channel.topic].push(time_us, |_, field| row[field]);
     }
 }

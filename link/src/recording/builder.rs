@@ -10,7 +10,7 @@
 
 use super::places::Places;
 use super::rhythm::{self, Rhythm};
-use super::{Columns, Gap, MAX_POINTS, Note, Position, Recording, RecordingError, Role};
+use super::{Column, Columns, Gap, MAX_POINTS, Note, Position, Recording, RecordingError, Role};
 
 /// Largest number accepted: differences of such numbers and their weighted sums stay finite.
 const LARGEST: f64 = 1e300;
@@ -109,6 +109,17 @@ impl RecordingBuilder {
     pub fn with_max_points(mut self, max_points: usize) -> Self {
         self.max_points = max_points.max(4) & !1;
         self
+    }
+
+    /// Gives the signals other names and units than those at the start.
+    pub(crate) fn name_signals(
+        &mut self,
+        input: Column,
+        output: Column,
+        set_point: Option<Column>,
+    ) {
+        (self.columns.input, self.columns.output) = (input, output);
+        self.columns.set_point = set_point;
     }
 
     /// Adds a note.

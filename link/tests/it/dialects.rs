@@ -395,7 +395,7 @@ fn an_incomplete_last_line() {
 #[test]
 fn a_few_rows_without_numbers() {
     for missing in [
-        "nan", "NaN", "NA", "null", "", "inf", "-inf", "1e999", "#N/A",
+        "nan", "NaN", "NA", "null", "", "inf", "-inf", "1e999", "#N/A", "---", "****",
     ] {
         let mut text = String::from("t,pv,u\n");
         for i in 0..100 {

@@ -1,6 +1,7 @@
 //! Tests of the reader through its public interface.
 
 mod averaging;
+mod awkward;
 mod dialects;
 mod flight_logs;
 mod fuzz_targets;

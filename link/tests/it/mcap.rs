@@ -3,7 +3,12 @@
 use std::fs;
 use std::path::PathBuf;
 
-use onecycle_link::{Axis, ControlLoop, FirmwareKind, FlightLog, LogFormat, Wanted, read_tables};
+use onecycle_link::{
+    Axis, ControlLoop, CsvOptions, FirmwareKind, FlightLog, LogFormat, ReadError, Recording,
+    Wanted, read_from, read_tables,
+};
+
+use crate::step::{ROWS, assert_names, assert_rows, sample};
 
 const LOGS: [&str; 3] = ["px4_none.mcap", "px4_lz4.mcap", "px4_zstd.mcap"];
 
@@ -132,4 +137,157 @@ fn damaged_logs_do_no_harm() {
             }
         }
     }
+}
+
+/// A record: kind, size, payload.
+fn record(kind: u8, payload: &[u8]) -> Vec<u8> {
+    [&[kind][..], &(payload.len() as u64).to_le_bytes(), payload].concat()
+}
+
+fn text(text: &str) -> Vec<u8> {
+    [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+}
+
+/// A log with channels of this type and text, and messages: channel from 1, time (ns), bytes behind the header of CDR.
+fn log(channels: &[(&str, &str, &str)], messages: &[(u16, u64, Vec<u8>)]) -> Vec<u8> {
+    let mut log = b"\x89MCAP0\r\n".to_vec();
+    for ((topic, name, definition), id) in channels.iter().zip(1_u16..) {
+        let id = id.to_le_bytes();
+        log.extend(record(
+            3,
+            &[&id[..], &text(name), &text("ros2msg"), &text(definition)].concat(),
+        ));
+        let channel = [&id[..], &id, &text(topic), &text("cdr"), &[0; 4]].concat();
+        log.extend(record(4, &channel));
+    }
+    for (id, time_ns, body) in messages {
+        let times = [time_ns.to_le_bytes(), time_ns.to_le_bytes()].concat();
+        log.extend(record(
+            5,
+            &[&id.to_le_bytes()[..], &[0; 4], &times, &[0, 1, 0, 0], body].concat(),
+        ));
+    }
+    log.extend(record(2, &[0; 20]));
+    log
+}
+
+const JOINT_STATE: &str = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n\
+    ================\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
+    ================\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+
+/// A message of type JointState at second `i` with joints of these names.
+fn joints(i: u32, names: [&str; 2], position: [f64; 2], effort: [f64; 2]) -> Vec<u8> {
+    let mut body = [
+        &(1000 + i).to_le_bytes()[..],
+        &0_u32.to_le_bytes(),
+        &1_u32.to_le_bytes(),
+        &[0],
+    ]
+    .concat();
+    let put = |body: &mut Vec<u8>, size: usize, value: &[u8]| {
+        body.resize(body.len().next_multiple_of(size), 0);
+        body.extend(value);
+    };
+    put(&mut body, 4, &2_u32.to_le_bytes());
+    for name in names {
+        put(&mut body, 4, &(name.len() as u32 + 1).to_le_bytes());
+        body.extend(name.as_bytes());
+        body.push(0);
+    }
+    for values in [&position[..], &[], &effort[..]] {
+        put(&mut body, 4, &(values.len() as u32).to_le_bytes());
+        values
+            .iter()
+            .for_each(|value| put(&mut body, 8, &value.to_le_bytes()));
+    }
+    body
+}
+
+fn seconds(i: u32) -> u64 {
+    1_000_000_000 * u64::from(1000 + i)
+}
+
+fn read(log: &[u8], input: &str, output: &str) -> Result<Recording, ReadError> {
+    read_from(
+        log,
+        &CsvOptions::default()
+            .input_column(input)
+            .output_column(output),
+    )
+}
+
+// The header is on the second, the recorder up to 9 ms late.
+#[test]
+fn joint_states_have_the_names_of_their_joints() {
+    let rows = |names: [&'static str; 2]| {
+        (0..ROWS).map(move |i| {
+            let (u, y) = sample(i);
+            let late_ns = 1_000_000 * u64::from(i % 10);
+            (
+                1,
+                seconds(i) + late_ns,
+                joints(i, names, [y, 0.5], [u, 0.25]),
+            )
+        })
+    };
+    let channels = [(
+        "/arm/joint_states",
+        "sensor_msgs/msg/JointState",
+        JOINT_STATE,
+    )];
+    let mut messages: Vec<_> = rows(["shoulder", "elbow"]).collect();
+    let bytes = log(&channels, &messages);
+    let recording = read(
+        &bytes,
+        "joint_states.effort.shoulder",
+        "joint_states.position.shoulder",
+    );
+    assert_rows(&recording.expect("a recording"), 1.0, 1.0);
+    // Which joint is not guessed.
+    let error = read_from(&*bytes, &CsvOptions::default())
+        .expect_err("two joints")
+        .to_string();
+    assert!(error.contains("joint_states.position.elbow"), "{error}");
+    // Joints in another order are other signals.
+    messages.truncate(40);
+    messages.extend(rows(["elbow", "shoulder"]).skip(40));
+    let bytes = log(&channels, &messages);
+    let recording = read(
+        &bytes,
+        "joint_states.effort.shoulder",
+        "joint_states.position.shoulder",
+    );
+    assert_eq!(recording.expect("a recording").len(), 40);
+    // Cut within the messages.
+    let cut = read(
+        &bytes[..bytes.len() / 2],
+        "joint_states.effort.shoulder",
+        "joint_states.position.shoulder",
+    );
+    assert!(cut.is_ok_and(|cut| (10..40).contains(&cut.len())));
+}
+
+#[test]
+fn topics_of_numbers() {
+    let number = |id: u16, i: u32, value: f64| (id, seconds(i), value.to_le_bytes().to_vec());
+    let messages: Vec<_> = (0..ROWS)
+        .flat_map(|i| [number(1, i, sample(i).0), number(2, i, sample(i).1)])
+        .collect();
+    let float = ("std_msgs/msg/Float64", "float64 data");
+    let channels = [
+        ("/oven/command", float.0, float.1),
+        ("/oven/temperature", float.0, float.1),
+    ];
+    let bytes = log(&channels, &messages);
+    let recording = read_from(&*bytes, &CsvOptions::default()).expect("a recording");
+    assert_rows(&recording, 1.0, 1.0);
+    assert_names(&recording, "command.data", "temperature.data");
+    let none = log(
+        &[("/oven/command", "std_msgs/msg/String", "string data")],
+        &[],
+    );
+    let error = read_from(&*none, &CsvOptions::default())
+        .expect_err("no numbers")
+        .to_string();
+    assert!(error.contains("no channel of numbers"), "{error}");
 }

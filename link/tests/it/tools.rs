@@ -1,6 +1,6 @@
 //! Files of tools, in the layouts that their documentation and sources give: the same step test in each.
 
-use onecycle_link::CsvOptions;
+use onecycle_link::{CsvOptions, read_from};
 
 use crate::step::{ROWS, assert_names, assert_rows, clock, read, read_with, refusal, rows, sample};
 
@@ -257,4 +257,67 @@ fn home_assistant() {
         compressed(|i| sample(i).1)
     );
     assert_rows(&read(json.as_bytes()), 1.0, 1.0);
+}
+
+const DBC: &str = "BO_ 257 Command: 2 ECU\n SG_ Duty : 0|16@1+ (0.1,0) [0|100] \"%\" ECU\n\n\
+    BO_ 258 Status: 4 ECU\n SG_ Temperature : 7|16@0- (0.01,0) [0|0] \"degC\" ECU\n SG_ Alive : 16|4@1+ (1,0) [0|0] \"\" ECU\n";
+
+#[test]
+fn candump_with_a_dbc() {
+    let frames = |format: &dyn Fn(u32, u32, &[u8]) -> String| {
+        rows(|i, u, y| {
+            let [low, high] = ((10.0 * u) as u16).to_le_bytes();
+            let [first, second] = ((100.0 * y).round() as i16).to_be_bytes();
+            let command = format(1000 * i, 0x101, &[low, high]);
+            let status = format(1000 * i + 1, 0x102, &[first, second, (i % 16) as u8, 0]);
+            format!(
+                "{command}\n{}\n{status}",
+                format(1000 * i, 0x7ff, &[1, 2, 3])
+            )
+        })
+    };
+    let hex = |data: &[u8], between: &str| {
+        let bytes: Vec<String> = data.iter().map(|byte| format!("{byte:02X}")).collect();
+        bytes.join(between)
+    };
+    let time = |ms: u32| format!("({}.{:03}000)", 1_710_230_400 + ms / 1000, ms % 1000);
+    let log = frames(&|ms, id, data| format!("{} can0 {id:03X}#{}", time(ms), hex(data, "")));
+    let screen = frames(&|ms, id, data| {
+        format!(
+            " {}  can0  {id:03X}   [{}]  {}",
+            time(ms),
+            data.len(),
+            hex(data, " ")
+        )
+    });
+    let mut options = CsvOptions::default();
+    options.dbc = Some(DBC.to_owned());
+    for text in [&log, &screen] {
+        let recording = read_with(text.as_bytes(), &options);
+        let measured = |i| (100.0 * sample(i).1).round() * 0.01;
+        assert_eq!(
+            recording.output(),
+            (0..ROWS).map(measured).collect::<Vec<_>>()
+        );
+        assert_eq!(recording.input()[..19], [10.0; 19]);
+        assert_names(&recording, "Command.Duty [%]", "Status.Temperature [degC]");
+        let named = options.clone().output_column("Status.Alive");
+        assert_eq!(read_with(text.as_bytes(), &named).output()[17], 1.0);
+    }
+    assert!(refusal(log.as_bytes()).contains("no DBC file says what they are"));
+    let since = frames(&|ms, id, data| {
+        format!(
+            "({}) can0 {id:03X}#{}",
+            if ms % 1000 == 1 { "0.999" } else { "0.001" },
+            hex(data, "")
+        )
+    });
+    assert!(refusal(since.as_bytes()).contains("no times that count from one start"));
+    let without = screen.replace("(17", "(x17");
+    assert!(read_from(without.as_bytes(), &options).is_err());
+    options.dbc = Some(DBC.replace("257", "1").replace("258", "2"));
+    let error = read_from(log.as_bytes(), &options)
+        .expect_err("other frames")
+        .to_string();
+    assert!(error.contains("describes no frame"), "{error}");
 }

@@ -1,5 +1,7 @@
 //! Values of settings, read from text and checked.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::RangeBounds;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +10,9 @@ use onecycle_identify::{Hold, Method};
 use onecycle_link::{Axis, SAMPLE_RATES_HZ, TimeUnit};
 
 use super::{Against, LoopKind};
+
+/// Largest DBC file, in bytes: those of cars have some hundred thousand.
+const MOST_OF_A_DBC: u64 = 1 << 24;
 
 /// Methods for a steady relay oscillation by name.
 pub const METHODS: [(&str, Method); 3] = [
@@ -152,6 +157,20 @@ pub fn sample_rate(text: &str) -> Result<f64, String> {
 pub fn time_unit(text: &str) -> Result<TimeUnit, String> {
     TimeUnit::from_name(text)
         .ok_or_else(|| "a unit of time is d, h, min, s, ms, us or ns".to_owned())
+}
+
+/// The text of a DBC file of at most 16 MiB.
+///
+/// # Errors
+/// One sentence.
+pub fn dbc(path: &str) -> Result<String, String> {
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let read = file.take(MOST_OF_A_DBC + 1).read_to_end(&mut bytes);
+    match read.map_err(|error| error.to_string())? as u64 {
+        0..=MOST_OF_A_DBC => Ok(String::from_utf8_lossy(&bytes).into_owned()),
+        _ => Err(format!("the file has more than {MOST_OF_A_DBC} bytes")),
+    }
 }
 
 /// A time in seconds.

@@ -21,6 +21,8 @@ pub struct Controllers {
     pub source: Source,
     /// The controller of a process control system in which the gains are typed, and its ranges.
     pub plant: Option<(Vendor, Spans)>,
+    /// The model as the devices of this controller take it: a name, and what is typed. `None`: they take none.
+    pub device_model: Option<(&'static str, String)>,
 }
 
 /// Where the model comes from.

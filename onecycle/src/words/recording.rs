@@ -104,7 +104,15 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
         E::RaggedRow { .. } => {
             "correct the line, or separate the columns by semicolons if they hold decimal commas"
         }
+        E::NoDbc { .. } => "give the DBC file of the bus with `dbc`",
+        E::NoCanTimes => "record with `candump -l` or `candump -ta`",
+        E::BadDbc { .. } => {
+            "lines begin with BO_ and SG_, as in SG_ Speed : 0|16@1+ (0.1,0) [0|0] \"rpm\" ECU"
+        }
         E::NotANumber { .. } => "correct it or leave it empty",
+        E::NoNumber { .. } => {
+            "choose another with `input` or `output`, or export it with its values"
+        }
         E::MixedDecimals { .. } => "export it with one of them and without separators of thousands",
         E::SeveralLoops { .. } => "choose one with `tag`",
         E::NoSuchLoop { .. } => {

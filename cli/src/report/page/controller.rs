@@ -24,6 +24,7 @@ pub(super) fn section(
     let law = controller.form().law().to_owned();
     let mut facts: Vec<(&str, String)> = forms(controller, units);
     facts.extend(in_plant(choice, controller));
+    facts.extend(choice.device_model.clone());
     facts.push(("law", law));
     facts.push(("margins", margins(choice, design, phase_margin_rad)));
     facts.extend(

@@ -4,7 +4,8 @@
 //! uint64 timestamp            name and type of a field; `#` begins a comment, `=` a constant
 //! float32[3] xyz              3 columns xyz[0] to xyz[2]
 //! geometry_msgs/Point p       columns p.x, p.y, p.z; its definition follows behind a line of ===, `MSG: geometry_msgs/Point`
-//! float32[] ranges            sequences (also `[<=N]`) and text have no column
+//! float32[] ranges            16 columns ranges[0] to ranges[15], NaN where it is shorter (also `[<=N]`); text has no column
+//! string[] name               labels: `position[0]` of a sensor_msgs/JointState is called `position.shoulder`
 //! ```
 //! In the bytes every number lies at a multiple of its size, counted behind the header of 4 bytes; sequences and text begin
 //! with their number of elements (u32).
@@ -16,6 +17,8 @@ use crate::log::scalar::Scalar;
 /// Maximum number of columns of a message, and of definitions inside each other.
 const MOST_COLUMNS: usize = 4096;
 const DEEPEST: usize = 8;
+/// Columns of a sequence of numbers: more are no signals.
+const OF_SEQUENCE: usize = 16;
 /// Bytes of the header, and its kind: CDR, little-endian.
 const HEADER: usize = 4;
 const LITTLE_ENDIAN: u8 = 1;
@@ -27,6 +30,8 @@ pub(super) struct Layout {
     pub(super) names: Vec<String>,
     /// The column `timestamp`.
     pub(super) timestamp: Option<usize>,
+    /// The columns of seconds and nanoseconds of the header.
+    pub(super) stamp: Option<[usize; 2]>,
     parts: Vec<Part>,
 }
 
@@ -34,6 +39,10 @@ pub(super) struct Layout {
 enum Part {
     Number(Scalar),
     Text,
+    /// Numbers that have columns.
+    Numbers(Scalar),
+    /// Texts that name the elements of sequences.
+    Labels,
     Sequence(Vec<Part>),
 }
 
@@ -65,10 +74,14 @@ pub(super) fn layout_of(name: &str, text: &str) -> Option<Layout> {
     }
     let mut names = Vec::new();
     let parts = parts_of(&definitions, last(name), "", Some(&mut names), DEEPEST)?;
-    let timestamp = names.iter().position(|name| name == "timestamp");
+    let place = |wanted| names.iter().position(|name| name == wanted);
+    let timestamp = place("timestamp");
+    let stamp = place("header.stamp.sec").zip(place("header.stamp.nanosec"));
+    let stamp = stamp.map(|(seconds, rest)| [seconds, rest]);
     Some(Layout {
         names,
         timestamp,
+        stamp,
         parts,
     })
 }
@@ -128,7 +141,14 @@ fn parts_of(
         };
         match field.count {
             Count::One => parts.extend(one(&name, names.as_deref_mut())?),
-            Count::Any => parts.push(Part::Sequence(one(&name, None)?)),
+            Count::Any => parts.push(match (scalar_of(field.kind), names.as_deref_mut()) {
+                (Some(scalar), Some(names)) => {
+                    names.extend((0..OF_SEQUENCE).map(|at| format!("{name}[{at}]")));
+                    Part::Numbers(scalar)
+                }
+                (None, Some(_)) if (field.kind, &*name) == ("string", "name") => Part::Labels,
+                _ => Part::Sequence(one(&name, None)?),
+            }),
             Count::Fixed(count) => {
                 for at in 0..count {
                     parts.extend(one(&format!("{name}[{at}]"), names.as_deref_mut())?);
@@ -162,12 +182,34 @@ fn scalar_of(kind: &str) -> Option<Scalar> {
 }
 
 impl Layout {
-    /// Reads the columns of a message into `row`. `None`: the message is too short, or of another encoding.
-    pub(super) fn read(&self, message: &[u8], row: &mut Vec<f64>) -> Option<()> {
+    /// Names of the columns if the elements of sequences have these labels.
+    pub(super) fn labelled(&self, labels: &[String]) -> Vec<String> {
+        let label = |name: &String| {
+            let (bare, at) = name.strip_suffix(']')?.rsplit_once('[')?;
+            Some(format!("{bare}.{}", labels.get(at.parse::<usize>().ok()?)?))
+        };
+        let all = self.names.iter();
+        all.map(|name| label(name).unwrap_or_else(|| name.clone()))
+            .collect()
+    }
+
+    /// Reads the columns of a message into `row`, and the labels of its sequences. `None`: the message is too short, or of another
+    /// encoding.
+    pub(super) fn read(
+        &self,
+        message: &[u8],
+        row: &mut Vec<f64>,
+        labels: &mut Vec<String>,
+    ) -> Option<()> {
         row.clear();
+        labels.clear();
         let (header, bytes) = message.split_at_checked(HEADER)?;
         (header[..2] == [0, LITTLE_ENDIAN]).then_some(())?;
-        let mut cursor = Cursor { bytes, at: 0 };
+        let mut cursor = Cursor {
+            bytes,
+            at: 0,
+            labels,
+        };
         cursor.read(&self.parts, Some(row))
     }
 }
@@ -175,6 +217,7 @@ impl Layout {
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
+    labels: &'a mut Vec<String>,
 }
 
 impl Cursor<'_> {
@@ -190,6 +233,18 @@ impl Cursor<'_> {
                 Part::Text => {
                     let count = self.count()?;
                     self.pass(count)?;
+                }
+                Part::Numbers(scalar) => self.numbers(*scalar, row.as_deref_mut())?,
+                Part::Labels => {
+                    for _ in 0..self.count()? {
+                        let count = self.count()?;
+                        let from = self.at;
+                        self.pass(count)?;
+                        if self.labels.len() < OF_SEQUENCE {
+                            let text = String::from_utf8_lossy(&self.bytes[from..self.at]);
+                            self.labels.push(text.trim_end_matches('\0').to_owned());
+                        }
+                    }
                 }
                 Part::Sequence(parts) => {
                     let count = self.count()?;
@@ -208,6 +263,24 @@ impl Cursor<'_> {
                     }
                 }
             }
+        }
+        Some(())
+    }
+
+    /// A sequence whose first elements have columns.
+    fn numbers(&mut self, scalar: Scalar, row: Option<&mut Vec<f64>>) -> Option<()> {
+        let count = self.count()?;
+        if count > 0 {
+            self.align(scalar.size());
+        }
+        let from = self.at;
+        self.pass(count.checked_mul(scalar.size())?)?;
+        let value = |at: usize| match at < count {
+            true => scalar.read(&self.bytes[from + at * scalar.size()..]),
+            false => f64::NAN,
+        };
+        if let Some(row) = row {
+            row.extend((0..OF_SEQUENCE).map(value));
         }
         Some(())
     }
@@ -246,7 +319,11 @@ mod tests {
     #[test]
     fn a_message_by_hand() {
         let layout = layout_of("my/msg/Test", TEXT).unwrap();
-        let names = ["timestamp", "ok", "xy[0]", "xy[1]", "p.x", "p.kind", "last"];
+        let mut names = ["timestamp", "ok", "xy[0]", "xy[1]", "p.x", "p.kind"]
+            .map(str::to_owned)
+            .to_vec();
+        names.extend((0..16).map(|at| format!("more[{at}]")));
+        names.push("last".to_owned());
         assert_eq!(layout.names, names);
         assert_eq!(layout.timestamp, Some(0));
         let mut bytes = vec![0_u8; 4 + 69];
@@ -266,15 +343,19 @@ mod tests {
         put(56, &[200]);
         put(60, &2_u32.to_le_bytes());
         put(68, &[7]);
-        let mut row = Vec::new();
-        layout.read(&bytes, &mut row).unwrap();
-        assert_eq!(row, [123.0, 1.0, 1.5, -2.5, 4.0, 200.0, 7.0]);
+        put(64, &5_i16.to_le_bytes());
+        let (mut row, mut labels) = (Vec::new(), Vec::new());
+        layout.read(&bytes, &mut row, &mut labels).unwrap();
+        assert_eq!(row[..8], [123.0, 1.0, 1.5, -2.5, 4.0, 200.0, 5.0, 0.0]);
+        assert!(row[8..22].iter().all(|value| value.is_nan()));
+        assert_eq!(row[22..], [7.0]);
         // Every shorter message is refused, and so is one that is big-endian.
         for length in 0..bytes.len() {
-            assert_eq!(layout.read(&bytes[..length], &mut row), None, "{length}");
+            let read = layout.read(&bytes[..length], &mut row, &mut labels);
+            assert_eq!(read, None, "{length}");
         }
         bytes[1] = 0;
-        assert_eq!(layout.read(&bytes, &mut row), None);
+        assert_eq!(layout.read(&bytes, &mut row, &mut labels), None);
     }
 
     // A type inside itself, one that is not defined, and too many columns.
