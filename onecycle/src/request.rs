@@ -276,6 +276,8 @@ pub struct Request {
     pub flight: Option<usize>,
     /// Parameters to write.
     pub write: Write,
+    /// Whether the process is all that is asked for, and no controllers to choose from.
+    pub without_controllers: bool,
 }
 
 impl Request {
@@ -314,6 +316,8 @@ impl Request {
             "input_before" => put(&mut self.input_before, values::finite(value)),
             "pack" => PackFile::read(value).map(|pack| self.pack = pack),
             "output_filter" => put(&mut self.output_filter_hz, values::cutoff_hz(value)),
+            "design" => choice(value, &[("true", false), ("false", true)])
+                .map(|without| self.without_controllers = without),
             _ => return None,
         };
         Some(set)
@@ -385,6 +389,13 @@ impl Request {
         {
             return Err(Error::request(
                 "`sample_rate` stands for the time column: leave out `time` and `time_unit`",
+            ));
+        }
+        if self.without_controllers
+            && (self.requirements.against.is_some() || self.write.file.is_some())
+        {
+            return Err(Error::request(
+                "`design=false` leaves no controller for `against` or `write`: leave it out",
             ));
         }
         let mut asked = self.requirements.specification()?;
@@ -463,10 +474,10 @@ impl Request {
         }
     }
 
-    /// Refuses the names of columns, which a flight log does not have.
-    pub(crate) fn check_log(&self, name: &str) -> Result<(), Error> {
+    /// Settings of a table that are given.
+    fn of_table(&self) -> Option<&'static str> {
         let columns = &self.columns;
-        let options = [
+        given(&[
             ("time", columns.time_column.is_some()),
             ("input", columns.input_column.is_some()),
             ("output", columns.output_column.is_some()),
@@ -474,10 +485,30 @@ impl Request {
             ("tag", columns.control_loop.is_some()),
             ("sample_rate", columns.sample_rate_hz.is_some()),
             ("time_unit", columns.time_unit.is_some()),
-        ];
-        match given(&options) {
+        ])
+    }
+
+    /// Refuses the names of columns, which a flight log does not have.
+    pub(crate) fn check_log(&self, name: &str) -> Result<(), Error> {
+        match self.of_table() {
             Some(setting) => Err(Error::Request(format!(
                 "`{setting}` is for tables, and {name} is a flight log: choose its signals with `axis` and `loop`"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses settings of files, for a recording in memory.
+    pub(crate) fn check_samples(&self) -> Result<(), Error> {
+        let of_file = [
+            ("axis", self.axis.is_some()),
+            ("loop", self.control_loop.is_some()),
+            ("flight", self.flight.is_some()),
+            ("write", self.write.file.is_some()),
+        ];
+        match self.of_table().or(given(&of_file)) {
+            Some(setting) => Err(Error::Request(format!(
+                "`{setting}` is for a file, and the recording is in memory: leave out `{setting}`"
             ))),
             None => Ok(()),
         }

@@ -20,7 +20,7 @@ pub mod verdict;
 use std::borrow::Cow;
 
 /// Names of the settings in sentences: those of a request, and what a program makes of a report.
-const SETTINGS: [&str; 44] = [
+const SETTINGS: [&str; 45] = [
     "against",
     "amplitude",
     "axis",
@@ -29,6 +29,7 @@ const SETTINGS: [&str; 44] = [
     "controller",
     "cycles",
     "dead_time_share",
+    "design",
     "details",
     "flight",
     "from",

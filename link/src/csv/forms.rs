@@ -145,7 +145,7 @@ pub(super) fn table(text: Text<'_>) -> Result<(Text<'_>, Option<Note>), ReadErro
         return Err(ReadError::NoPower);
     }
     let note = Note::Format {
-        format: form.format,
+        format: form.format.into(),
         columns: columns.len(),
     };
     let rows = Rows {
