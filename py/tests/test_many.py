@@ -1,5 +1,8 @@
 """Many recordings, and processes without controllers."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -52,3 +55,25 @@ def test_without_controllers_the_process_is_the_same():
     for options in ({"against": (1, 1, 0)}, {"write": "x.params"}):
         with pytest.raises(onecycle.OnecycleError, match="`design=False`"):
             onecycle.identify(HOVER, design=False, **options)
+
+
+LONG = """
+import os, signal, threading, time
+import onecycle
+recording = onecycle.read("examples/simulated_hover.csv")
+threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    onecycle.identify_many([recording] * 10_000, n_jobs=2)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+# Those that were begun end, and no others begin: the processor rests long before the hour that all would take.
+begin = float("-inf")
+while time.process_time() - begin > 0.1:
+    begin = time.process_time()
+    time.sleep(0.5)
+"""
+
+
+def test_ctrl_c_ends_a_batch():
+    run = subprocess.run([sys.executable, "-c", LONG], capture_output=True, text=True, timeout=300)
+    assert run.stdout == "interrupted\n" and run.returncode == 0, run.stderr

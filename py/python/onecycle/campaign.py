@@ -34,7 +34,7 @@ def main() -> int:
     from onecycle._cluster import fill, run
 
     # A lost scheduler is told in a sentence.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    logging.disable(logging.CRITICAL)
     try:
         with Client(arguments.scheduler) as client:  # type: ignore[no-untyped-call]
             if arguments.examples is not None:
