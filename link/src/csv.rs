@@ -204,7 +204,10 @@ fn whole(bytes: impl Read, most: usize) -> Result<Vec<u8>, ReadError> {
 
 fn of_sheet<'a>(sheet: Sheet, format: &'static str) -> (Text<'a>, Separator, Option<Note>) {
     let columns = sheet.columns();
-    let note = Note::Format { format, columns };
+    let note = Note::Format {
+        format: format.into(),
+        columns,
+    };
     (sheet.text(), Separator::Tab, Some(note))
 }
 

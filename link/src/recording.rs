@@ -42,6 +42,7 @@ pub const GAP_PERIODS: f64 = 5.0;
 
 /// Which signal a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Role {
     /// Time stamps.
@@ -69,6 +70,7 @@ impl fmt::Display for Role {
 
 /// Position of a sample in its source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Position {
     /// Line of a text file, counted from 1.
@@ -90,6 +92,7 @@ impl fmt::Display for Position {
 ///
 /// `Display` gives `"pv" (column 2)`, or `column 2` if the column has no name.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct ColumnLabel {
     /// Name in the header, shortened to 32 printable characters; `None` without a header.
@@ -109,6 +112,7 @@ impl fmt::Display for ColumnLabel {
 
 /// Name and unit of a column as the source gives them.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Column {
     /// Name, without the unit.
@@ -136,6 +140,7 @@ impl Column {
 
 /// The columns of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Columns {
     /// Column of the time stamps.
@@ -178,6 +183,7 @@ impl Columns {
 
 /// A gap in the recording: no samples for longer than [`GAP_PERIODS`] median increments of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Gap {
     /// Index of the first point after the gap; at least 1.
@@ -193,6 +199,7 @@ pub struct Gap {
 ///
 /// At least two points; time strictly increasing; every number finite and at most 1e300 in size.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Recording {
     time_s: Vec<f64>,
     input: Vec<f64>,

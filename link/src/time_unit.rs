@@ -2,6 +2,7 @@
 
 /// A unit of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum TimeUnit {
     /// 86,400 s, as spreadsheets count dates.

@@ -63,6 +63,10 @@ pub(crate) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> A
         .choice
         .and_then(|choice| Some((choice, choice.design()?)))
     else {
+        if subject.choice.is_none() {
+            let next = sentence(words::ASK_FOR_CONTROLLERS);
+            return not_yet(words::NONE_ASKED.to_owned(), next, Some(sure));
+        }
         let row = subject.choice.and_then(Controllers::chosen);
         let error = row.and_then(|row| row.proposal.outcome.as_ref().err());
         let next = error.map_or(String::new(), |error| sentence(&advice(error)));

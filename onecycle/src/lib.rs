@@ -40,7 +40,7 @@
 //! | find out why there is no result, or what limits it | [`Verdict`], [`Remark`] |
 //! | describe a process | [`Model`], [`Structure`], [`Parameter`], [`Unit`], [`Soiptd`], [`Linear`] |
 //! | design a controller | [`design()`], [`design_over()`], [`Specification`], [`Style`], [`MeasurementNoise`], [`Execution`], [`LowPass`], [`Design`], [`Robustness`] |
-//! | type a controller in | [`Controller`], [`Form`], [`Pid`], [`Pd`], [`Ideal`], [`Series`], [`Autopilot`] |
+//! | type a controller in | [`Controller`], [`Form`], [`Pid`], [`Pd`], [`Ideal`], [`Series`], [`Autopilot`], [`Cascade`] |
 //! | choose between controllers, judge the gains in force | [`Proposal`], [`proposals()`], [`assess()`], [`Assessment`], [`least_margins()`], [`LeastMargins`], [`Comparison`], [`Effect`], [`Felt`] |
 //! | analyse a loop | [`margins()`], [`Margins`], [`sensitivity()`], [`Sensitivity`], [`ise()`], [`load_iae()`], [`step_response()`], [`StepResponse`], [`step_metrics()`], [`StepMetrics`], [`load_response()`], [`LoadResponse`] |
 //! | simulate a relay test | [`Experiment`], [`Sensor`], [`Trace`], [`FixedStepProcess`], [`Relay`], [`RelaySettings`] |
@@ -320,8 +320,8 @@ pub use onecycle_onboard::pack::{Pack, PackError};
 // Models, controllers, design.
 #[doc(inline)]
 pub use onecycle_design::{
-    Assessment, Autopilot, Comparison, Controller, Design, DesignError, Effect, Execution, Felt,
-    Form, Ideal, LeastMargins, Linear, LinearError, LoadResponse, LowPass, Margins,
+    Assessment, Autopilot, Cascade, Comparison, Controller, Design, DesignError, Effect, Execution,
+    Felt, Form, Ideal, LeastMargins, Linear, LinearError, LoadResponse, LowPass, Margins,
     MeasurementNoise, Model, Parameter, Pid, Proposal, Robustness, Sensitivity, Series,
     Specification, StepMetrics, StepResponse, StepResponseError, Structure, Style, Unit, assess,
     design, design_over, ise, least_margins, load_iae, load_response, margins, proposals,

@@ -3,6 +3,7 @@
 //! With the feature `serde` a request is read from a map of its settings, each a number or a text: `{"style": "calm",
 //! "phase_margin": 45, "noise": "10%"}`. The names are those that sentences give in backticks.
 
+mod checks;
 #[cfg(feature = "serde")]
 mod map;
 pub mod values;
@@ -20,7 +21,6 @@ use onecycle_link::{Axis, ColumnRef, ControlLoop, CsvOptions};
 use self::values::choice;
 use crate::Structure;
 use crate::error::Error;
-use crate::source::Source;
 
 /// Name and version of the settings. It changes with every change that a caller could notice, added settings excepted.
 pub const SCHEMA: &str = "onecycle.request/1";
@@ -276,6 +276,8 @@ pub struct Request {
     pub flight: Option<usize>,
     /// Parameters to write.
     pub write: Write,
+    /// Whether the process is all that is asked for, and no controllers to choose from.
+    pub without_controllers: bool,
 }
 
 impl Request {
@@ -314,6 +316,8 @@ impl Request {
             "input_before" => put(&mut self.input_before, values::finite(value)),
             "pack" => PackFile::read(value).map(|pack| self.pack = pack),
             "output_filter" => put(&mut self.output_filter_hz, values::cutoff_hz(value)),
+            "design" => choice(value, &[("true", false), ("false", true)])
+                .map(|without| self.without_controllers = without),
             _ => return None,
         };
         Some(set)
@@ -388,6 +392,13 @@ impl Request {
                 "`sample_rate` stands for the time column: leave out `time` and `time_unit`",
             ));
         }
+        if self.without_controllers
+            && (self.requirements.against.is_some() || self.write.file.is_some())
+        {
+            return Err(Error::request(
+                "`design=false` leaves no controller for `against` or `write`: leave it out",
+            ));
+        }
         let mut asked = self.requirements.specification()?;
         if let Some(share) = self.noise_share {
             if asked.style == Style::Paper {
@@ -402,87 +413,6 @@ impl Request {
     pub(crate) fn of_cycles(&self) -> Option<usize> {
         let is_asked = self.method != Method::Map || self.pack.is_some();
         self.cycles.or(is_asked.then_some(USUAL_CYCLES))
-    }
-
-    /// Refuses settings that a fit to the cycles of a relay test does not have.
-    fn check_estimator(&self) -> Result<(), Error> {
-        let is_other = |structure| structure != Structure::Soiptd;
-        let refused = [
-            ("structure", self.structure.is_some_and(is_other)),
-            ("from", self.from_s.is_some()),
-            ("to", self.to_s.is_some()),
-            ("hold=interpolated", self.hold == Some(Hold::Interpolated)),
-        ];
-        match given(&refused).filter(|_| self.of_cycles().is_some()) {
-            Some(setting) => Err(Error::Request(format!(
-                "`{setting}` is for the whole recording: leave it out, or `cycles`, `method` and `pack`"
-            ))),
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses a part of the recording that is empty.
-    pub(crate) fn check_span(&self, times_s: &[f64]) -> Result<(), Error> {
-        let (Some(&start_s), Some(&end_s)) = (times_s.first(), times_s.last()) else {
-            return Ok(());
-        };
-        let from_s = self.from_s.unwrap_or(start_s);
-        let to_s = self.to_s.unwrap_or(end_s);
-        if from_s >= to_s || from_s >= end_s || to_s <= start_s {
-            return Err(Error::Request(format!(
-                "`from={from_s}` `to={to_s}` leaves nothing: the recording runs from {start_s:.3} to {end_s:.3} s"
-            )));
-        }
-        Ok(())
-    }
-
-    /// Refuses settings of flight logs, for a table.
-    pub(crate) fn check_table(&self, source: &dyn Source) -> Result<(), Error> {
-        let options = [
-            ("axis", self.axis.is_some()),
-            ("loop", self.control_loop.is_some()),
-            ("flight", self.flight.is_some()),
-        ];
-        let name = source.name();
-        if self.write.file.is_some() || given(&options).is_some() {
-            // A file that is not there is no table either.
-            source.open().map_err(|error| Error::Unreadable {
-                name: name.clone(),
-                reason: error.to_string(),
-            })?;
-        }
-        if self.write.file.is_some() {
-            return Err(Error::Request(format!(
-                "`write` writes parameters of an autopilot, and {name} is not a flight log: leave out `write`"
-            )));
-        }
-        match given(&options) {
-            Some(setting) => Err(Error::Request(format!(
-                "`{setting}` is for flight logs, and {name} is not a flight log: leave out `{setting}`"
-            ))),
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses the names of columns, which a flight log does not have.
-    pub(crate) fn check_log(&self, name: &str) -> Result<(), Error> {
-        let columns = &self.columns;
-        let options = [
-            ("time", columns.time_column.is_some()),
-            ("input", columns.input_column.is_some()),
-            ("output", columns.output_column.is_some()),
-            ("set_point", columns.set_point_column.is_some()),
-            ("tag", columns.control_loop.is_some()),
-            ("sample_rate", columns.sample_rate_hz.is_some()),
-            ("time_unit", columns.time_unit.is_some()),
-            ("dbc", columns.dbc.is_some()),
-        ];
-        match given(&options) {
-            Some(setting) => Err(Error::Request(format!(
-                "`{setting}` is for tables, and {name} is a flight log: choose its signals with `axis` and `loop`"
-            ))),
-            None => Ok(()),
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use onecycle_design::Specification;
 use onecycle_identify::progress::part;
-use onecycle_identify::{Identification, Verdict};
+use onecycle_identify::{About, Identification, Remark, Verdict};
 use onecycle_link::{Recording, Span};
 use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE};
 
@@ -63,8 +63,9 @@ impl Request {
     /// Identifies from a recording in memory; `name` stands in the report.
     ///
     /// # Errors
-    /// One sentence: the settings contradict each other.
+    /// One sentence: the settings contradict each other, or are those of a file.
     pub fn identify_recording(&self, name: &str, recording: Recording) -> Result<Report, Error> {
+        self.check_samples()?;
         let in_force = InForce::of(&self.requirements, None)?;
         self.report(
             name.to_owned(),
@@ -95,6 +96,10 @@ impl Request {
     ) -> Result<Survey, Error> {
         let asked = self.specification()?;
         self.check_log(&source.name())?;
+        if self.without_controllers {
+            let reason = "`design=false` is for one loop: choose it with `axis` and `loop`";
+            return Err(Error::request(reason));
+        }
         let manner = Manner {
             has_pages,
             progress,
@@ -177,12 +182,17 @@ impl Request {
         };
         let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
         let against = set.against.or_else(in_force);
+        if self.without_controllers {
+            leave_controllers(&mut identification);
+        }
         let identified = identification.outcome.as_ref().ok();
-        let choice = identified.map(|identified| {
-            Controllers::of_identified(identified, against)
-                .in_plant(set.plant)
-                .with_device_model(identified)
-        });
+        let choice = identified
+            .filter(|_| !self.without_controllers)
+            .map(|identified| {
+                Controllers::of_identified(identified, against)
+                    .in_plant(set.plant)
+                    .with_device_model(identified)
+            });
         let choice = match (&of_log, set.against, choice) {
             (Some(of_log), None, Some(choice)) if of_log.contradicts(&choice) => {
                 identification.refuse(Verdict::UnstableInForce);
@@ -227,6 +237,20 @@ impl Request {
             .beta(self.beta)
             .input_late_s(self.input_late_s)
             .input_before(self.input_before)
+    }
+}
+
+/// Takes the controller out of a result, and what there is to say about it.
+fn leave_controllers(found: &mut Identification) {
+    if let Ok(identified) = &mut found.outcome {
+        identified.design = None;
+        identified.phase_margin_rad = None;
+        identified.step = None;
+        identified.resonance = None;
+        let is_on_design = |remark: &Remark| {
+            remark.about() == About::Controller || matches!(remark, Remark::NoController(_))
+        };
+        found.remarks.retain(|remark| !is_on_design(remark));
     }
 }
 

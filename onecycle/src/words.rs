@@ -20,7 +20,7 @@ pub mod verdict;
 use std::borrow::Cow;
 
 /// Names of the settings in sentences: those of a request, and what a program makes of a report.
-const SETTINGS: [&str; 45] = [
+const SETTINGS: [&str; 46] = [
     "against",
     "amplitude",
     "axis",
@@ -30,6 +30,7 @@ const SETTINGS: [&str; 45] = [
     "cycles",
     "dbc",
     "dead_time_share",
+    "design",
     "details",
     "flight",
     "from",

@@ -9,6 +9,7 @@ from pathlib import Path
 from distributed import Client, LocalCluster, get_task_stream
 
 import onecycle
+import onecycle_lab
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,43 +8,42 @@
     reason = "arguments from Python and errors are handed over by value"
 )]
 
+mod controller;
+mod error;
 mod process;
+mod report;
 mod waited;
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{PyArray1, PyReadonlyArray1};
 use onecycle::results::log_gains::NamedFiles;
 use onecycle::source::is_flight_log;
-use onecycle::words::verdict::advice;
 use onecycle::{DesignRequest, Error, Report, Request};
-use onecycle_cli::report::json::to_text;
-use onecycle_cli::report::{flight, identify as shown};
-use onecycle_cli::style::plain;
-use onecycle_cli::words::with_options;
-use pyo3::create_exception;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use pythonize::{depythonize, pythonize};
+use pyo3::types::PyBytes;
+use rayon::prelude::*;
 
+use crate::error::{OnecycleError, as_keyword, raised, refused};
+use crate::report::{Designed, Found, Survey};
 use crate::waited::waited;
 
-create_exception!(
-    _onecycle,
-    OnecycleError,
-    PyValueError,
-    "Input that cannot be used. The message says what is wrong and what to do."
-);
-
-fn refused(sentence: impl ToString) -> PyErr {
-    OnecycleError::new_err(sentence.to_string())
-}
+/// Settings by name, as text.
+type Settings = Vec<(String, String)>;
 
 /// What keywords ask for.
-fn asked<T: serde::de::DeserializeOwned>(settings: &Bound<'_, PyDict>) -> PyResult<T> {
-    depythonize(settings).map_err(refused)
+fn asked<T: Default>(
+    settings: &Settings,
+    set: impl Fn(&mut T, &str, &str) -> Result<(), Error>,
+) -> PyResult<T> {
+    let mut request = T::default();
+    for (name, value) in settings {
+        set(&mut request, name, value).map_err(|error| refused(&error))?;
+    }
+    Ok(request)
 }
 
 /// Writes the files with parameters, or none where one of them exists.
@@ -70,13 +69,13 @@ fn write(files: Option<&NamedFiles>) -> Result<(), Error> {
 }
 
 /// A recording of a control loop.
-#[pyclass(frozen, module = "onecycle")]
-struct Recording(onecycle::Recording);
+#[pyclass(frozen, eq, module = "onecycle._onecycle")]
+#[derive(PartialEq)]
+struct Recording(Arc<onecycle::Recording>);
 
 #[pymethods]
 impl Recording {
     #[new]
-    #[pyo3(signature = (t, u, y, r = None))]
     fn new(
         t: PyReadonlyArray1<'_, f64>,
         u: PyReadonlyArray1<'_, f64>,
@@ -88,38 +87,52 @@ impl Recording {
             None => onecycle::Recording::from_samples(t, u, y),
             Some(r) => onecycle::Recording::from_closed_loop(t, u, y, r.as_slice()?),
         };
-        recording.map(Self).map_err(refused)
+        match recording {
+            Ok(recording) => Ok(Self(Arc::new(recording))),
+            Err(error) => Err(raised("recording", &error.to_string(), None)),
+        }
+    }
+
+    /// All of it, for `of_stored`.
+    fn stored<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = postcard::to_allocvec(&*self.0);
+        let bytes = bytes.map_err(|error| raised("recording", &error.to_string(), None))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    #[staticmethod]
+    fn of_stored(bytes: &[u8]) -> PyResult<Self> {
+        let recording = postcard::from_bytes(bytes);
+        let other = |_| "the recording was stored by another version of onecycle".to_owned();
+        let recording = recording.map_err(other);
+        let recording = recording.map_err(|sentence| raised("recording", &sentence, None))?;
+        Ok(Self(Arc::new(recording)))
     }
 
     fn __len__(&self) -> usize {
         self.0.len()
     }
 
-    /// Time stamps in seconds.
     #[getter]
     fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.0.time_s())
     }
 
-    /// Process input.
     #[getter]
     fn u<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.0.input())
     }
 
-    /// Process output.
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, self.0.output())
     }
 
-    /// Set-point, if it was recorded.
     #[getter]
     fn r<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         Some(PyArray1::from_slice(py, self.0.set_point()?))
     }
 
-    /// Sample period in seconds.
     #[getter]
     fn sample_period_s(&self) -> f64 {
         self.0.sample_period_s()
@@ -127,160 +140,145 @@ impl Recording {
 }
 
 #[pyfunction]
-fn read(py: Python<'_>, path: PathBuf, settings: &Bound<'_, PyDict>) -> PyResult<Recording> {
-    let request: Request = asked(settings)?;
+fn read(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResult<Recording> {
+    let request = asked(&settings, Request::set)?;
     let recording = waited(py, move || request.read(&path))?;
-    recording.map(Recording).map_err(refused)
+    let recording = recording.map_err(|error| refused(&error))?;
+    Ok(Recording(Arc::new(recording)))
 }
 
-/// What was identified, and the time that it took (s).
-#[pyclass(module = "onecycle")]
-struct Found(Report, f64);
-
-/// Identifies in another thread.
-fn found(
-    py: Python<'_>,
-    work: impl FnOnce() -> Result<Report, Error> + Send + 'static,
-) -> PyResult<Found> {
-    let (found, took_s) = waited(py, move || {
-        let begin = Instant::now();
-        let found = work();
-        (found, begin.elapsed().as_secs_f64())
-    })?;
-    let found = found.map_err(refused)?;
-    write(found.files()).map_err(refused)?;
-    Ok(Found(found, took_s))
+/// What is identified from: a file, or a recording in memory with its name.
+#[derive(FromPyObject)]
+enum Source<'py> {
+    Recording(String, PyRef<'py, Recording>),
+    File(PathBuf),
 }
 
-#[pymethods]
-impl Found {
-    #[getter]
-    fn took_s(&self) -> f64 {
-        self.1
-    }
-
-    fn json(&self) -> String {
-        to_text(&self.0)
-    }
-
-    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        pythonize(py, &self.0).map_err(refused)
-    }
-
-    fn page(&mut self) -> String {
-        shown::page(&mut self.0)
-    }
-
-    fn text(&self) -> String {
-        plain(&with_options(&shown::text(&self.0, true)))
-    }
-
-    fn refusal(&self) -> Option<String> {
-        let verdict = self.0.identification.outcome.as_ref().err()?;
-        Some(format!("{verdict}: {}", advice(verdict)))
-    }
-
-    /// The identified process, to the last bit.
-    fn model(&self) -> Option<process::Model> {
-        let identified = self.0.identification.outcome.as_ref().ok()?;
-        Some(process::Model(identified.model))
-    }
-
-    /// Parameter of every draw from the posterior, by key.
-    fn posterior<'py>(&self, py: Python<'py>) -> Vec<(&'static str, Bound<'py, PyArray1<f64>>)> {
-        let Ok(identified) = &self.0.identification.outcome else {
-            return vec![];
-        };
-        let structure = identified.model.structure();
-        let values = |&parameter: &onecycle::Parameter| {
-            let values = identified.posterior.values(parameter);
-            (parameter.key(), values.into_pyarray(py))
-        };
-        structure.parameters().iter().map(values).collect()
-    }
+/// The same, out of the interpreter's hands.
+enum Given {
+    Recording(String, Arc<onecycle::Recording>),
+    File(PathBuf),
 }
 
-#[pyfunction]
-fn identify_file(py: Python<'_>, path: PathBuf, settings: &Bound<'_, PyDict>) -> PyResult<Found> {
-    let request: Request = asked(settings)?;
-    found(py, move || {
-        if request.is_of_all_loops() && is_flight_log(&path) {
-            return Err(Error::Request(format!(
-                "{} is a flight log: choose one of its loops with `axis` and `loop`",
-                path.display()
-            )));
+impl From<Source<'_>> for Given {
+    fn from(source: Source<'_>) -> Self {
+        match source {
+            Source::Recording(name, recording) => Self::Recording(name, Arc::clone(&recording.0)),
+            Source::File(path) => Self::File(path),
         }
-        request.identify(&path)
-    })
+    }
+}
+
+impl Given {
+    fn report(self, request: &Request) -> Result<Report, Error> {
+        match self {
+            Self::File(path) if request.is_of_all_loops() && is_flight_log(&path) => {
+                Err(Error::Request(format!(
+                    "{} is a flight log: choose one of its loops with `axis` and `loop`",
+                    path.display()
+                )))
+            }
+            Self::File(path) => request.identify(&path),
+            Self::Recording(name, recording) => {
+                request.identify_recording(&name, Arc::unwrap_or_clone(recording))
+            }
+        }
+    }
+
+    /// The report, and the time that it took (s).
+    fn timed(self, request: &Request) -> Result<(Report, f64), Error> {
+        let begin = Instant::now();
+        let report = self.report(request)?;
+        Ok((report, begin.elapsed().as_secs_f64()))
+    }
+}
+
+fn found((report, took_s): (Report, f64)) -> PyResult<Found> {
+    write(report.files()).map_err(|error| refused(&error))?;
+    Ok(Found::new(report, took_s))
 }
 
 #[pyfunction]
-fn identify_recording(
-    py: Python<'_>,
-    name: String,
-    recording: &Recording,
-    settings: &Bound<'_, PyDict>,
-) -> PyResult<Found> {
-    let request: Request = asked(settings)?;
-    let recording = recording.0.clone();
-    found(py, move || request.identify_recording(&name, recording))
+fn identify(py: Python<'_>, source: Source<'_>, settings: Settings) -> PyResult<Found> {
+    let request = asked(&settings, Request::set)?;
+    let given = Given::from(source);
+    let report = waited(py, move || given.timed(&request))?;
+    found(report.map_err(|error| refused(&error))?)
 }
 
-/// Every loop of a flight log.
-#[pyclass(frozen, module = "onecycle")]
-struct Survey(onecycle::Survey);
-
-#[pymethods]
-impl Survey {
-    fn json(&self) -> String {
-        to_text(&self.0)
+/// Identifies on so many threads; 0: one for each core. The first error ends it.
+#[pyfunction]
+fn identify_many(
+    py: Python<'_>,
+    sources: Vec<Source<'_>>,
+    threads: usize,
+    settings: Settings,
+) -> PyResult<Vec<Found>> {
+    let request = asked(&settings, Request::set)?;
+    let given: Vec<Given> = sources.into_iter().map(Given::from).collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| raised("request", &error.to_string(), None))?;
+    // Set after Ctrl-C: what has not begun is left.
+    let is_left = Arc::new(AtomicBool::new(false));
+    let leave = Arc::clone(&is_left);
+    let work = move || {
+        let one = |given: Given| match is_left.load(Ordering::Relaxed) {
+            true => Err(Error::Request("interrupted".to_owned())),
+            false => given.timed(&request),
+        };
+        pool.install(|| given.into_par_iter().map(one).collect())
+    };
+    let reports: PyResult<Result<Vec<_>, Error>> = waited(py, work);
+    if reports.is_err() {
+        leave.store(true, Ordering::Relaxed);
     }
-
-    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        pythonize(py, &self.0).map_err(refused)
-    }
-
-    fn text(&self) -> String {
-        plain(&with_options(&flight::text(&self.0, false)))
-    }
+    let reports = reports?.map_err(|error| refused(&error))?;
+    reports.into_iter().map(found).collect()
 }
 
 #[pyfunction]
-fn identify_flight(
-    py: Python<'_>,
-    path: PathBuf,
-    settings: &Bound<'_, PyDict>,
-) -> PyResult<Survey> {
-    let request: Request = asked(settings)?;
-    let surveyed = waited(py, move || request.survey(&path))?.map_err(refused)?;
-    write(surveyed.files.as_ref()).map_err(refused)?;
+fn identify_flight(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResult<Survey> {
+    let request = asked(&settings, Request::set)?;
+    let surveyed = waited(py, move || request.survey(&path))?.map_err(|error| refused(&error))?;
+    write(surveyed.files.as_ref()).map_err(|error| refused(&error))?;
     Ok(Survey(surveyed))
 }
 
 #[pyfunction]
-fn design<'py>(
-    py: Python<'py>,
-    model: &process::Model,
-    settings: &Bound<'py, PyDict>,
-) -> PyResult<Bound<'py, PyAny>> {
-    let request: DesignRequest = asked(settings)?;
+fn design(py: Python<'_>, model: &process::Model, settings: Settings) -> PyResult<Designed> {
+    let request = asked(&settings, DesignRequest::set)?;
     let model = model.0;
-    let designed = waited(py, move || request.design(model))?.map_err(refused)?;
-    pythonize(py, &designed).map_err(refused)
+    let designed = waited(py, move || request.design(model))?.map_err(|error| refused(&error))?;
+    Ok(Designed(designed))
+}
+
+/// A text with the options of the program.
+#[pyfunction]
+fn with_options(text: &str) -> String {
+    onecycle_cli::words::with_options(text).into_owned()
 }
 
 #[pymodule]
 fn _onecycle(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("OnecycleError", module.py().get_type::<OnecycleError>())?;
+    onecycle_cli::words::show_settings(as_keyword);
+    let error = module.py().get_type::<OnecycleError>();
+    for name in ["kind", "setting", "file"] {
+        error.setattr(name, module.py().None())?;
+    }
+    // Where users find it, and pickle.
+    error.setattr("__module__", "onecycle")?;
+    module.add("OnecycleError", error)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<Recording>()?;
     module.add_class::<Found>()?;
     module.add_class::<Survey>()?;
+    module.add_class::<Designed>()?;
     module.add_class::<process::Model>()?;
     module.add_function(wrap_pyfunction!(read, module)?)?;
-    module.add_function(wrap_pyfunction!(identify_file, module)?)?;
-    module.add_function(wrap_pyfunction!(identify_recording, module)?)?;
+    module.add_function(wrap_pyfunction!(identify, module)?)?;
+    module.add_function(wrap_pyfunction!(identify_many, module)?)?;
     module.add_function(wrap_pyfunction!(identify_flight, module)?)?;
     module.add_function(wrap_pyfunction!(design, module)?)?;
+    module.add_function(wrap_pyfunction!(with_options, module)?)?;
     Ok(())
 }

@@ -3,50 +3,106 @@
 use std::collections::HashMap;
 
 use numpy::{Complex64, IntoPyArray, PyArray1, PyReadonlyArray1};
-use onecycle::{Controller, Linear, Noise, Pid, Structure};
+use onecycle::{Controller, Linear, Noise, Parameter, Structure};
 use onecycle_plant::{Disturbances, FixedStepLinear};
 use pyo3::prelude::*;
 
-use crate::refused;
+use crate::controller::Law;
+use crate::error::raised;
 
-/// `kp`, `ki`, `kd`, the time of the measurement filter (s) and the weight of the reference.
-fn controller([kp, ki, kd, filter_s, setpoint_weight]: [f64; 5]) -> Controller {
-    let mut pid = Pid::new(kp, ki, kd);
-    pid.filter_s = filter_s;
-    pid.setpoint_weight = setpoint_weight;
-    Controller::from(pid)
+/// Difference of a given parameter from the one that the others make, as a share, that rounding explains.
+const ROUNDING: f64 = 1e-9;
+
+fn wrong(sentence: &str) -> PyErr {
+    raised("request", sentence, None)
 }
 
+/// The numbers of a process.
+type State = (String, f64, [f64; 2], f64, [f64; 2], f64);
+
 /// A process.
-#[pyclass(frozen, module = "onecycle")]
+#[pyclass(frozen, eq, module = "onecycle._onecycle")]
+#[derive(PartialEq)]
 pub(crate) struct Model(pub(crate) onecycle::Model);
 
 #[pymethods]
 impl Model {
     /// A structure and its parameters by their keys, as in the JSON report.
     #[new]
-    #[pyo3(signature = (structure, **parameters))]
-    fn new(structure: &str, parameters: Option<HashMap<String, f64>>) -> PyResult<Self> {
-        let of = Structure::from_name(structure);
-        let of = of.ok_or_else(|| {
-            refused(format!(
-                "there is no structure {structure}: see docs/identify-json.md"
+    fn new(structure: &str, parameters: HashMap<String, f64>) -> PyResult<Self> {
+        let of = Structure::from_name(structure).ok_or_else(|| {
+            let names: Vec<&str> = Structure::ALL.iter().map(|of| of.name()).collect();
+            wrong(&format!(
+                "there is no structure {structure}: take one of {}",
+                names.join(", ")
             ))
         })?;
-        let given = parameters.unwrap_or_default();
-        let is_of = |key: &String| {
-            of.parameters()
-                .iter()
-                .any(|parameter| parameter.key() == key)
-        };
-        if let Some(key) = given.keys().find(|key| !is_of(key)) {
-            return Err(refused(format!("{structure} has no parameter {key}")));
+        let known = of.parameters();
+        let is_of = |key: &String| known.iter().any(|parameter| parameter.key() == key);
+        if let Some(key) = parameters.keys().find(|key| !is_of(key)) {
+            let keys: Vec<&str> = known.iter().map(|parameter| parameter.key()).collect();
+            return Err(wrong(&format!(
+                "{structure} has no parameter {key}: its parameters are {}",
+                keys.join(", ")
+            )));
         }
-        let value = |parameter: onecycle::Parameter| given.get(parameter.key()).copied();
-        let linear = Linear::from_parameters(of, value).map_err(refused)?;
-        Ok(Self(
-            linear.soiptd().map_or_else(|| linear.into(), Into::into),
-        ))
+        let given = |parameter: Parameter| parameters.get(parameter.key()).copied();
+        let linear = Linear::from_parameters(of, given).map_err(|error| {
+            let is_missing = given(error.parameter).is_none();
+            let key = error.parameter.key();
+            wrong(&match is_missing {
+                true => format!("{structure} needs {key}, {}", error.requirement),
+                false => format!(
+                    "{key} must be {}, but is {}",
+                    error.requirement, error.value
+                ),
+            })
+        })?;
+        let model = onecycle::Model::from(linear);
+        for &parameter in known {
+            let (Some(given), Some(made)) = (given(parameter), model.parameter(parameter)) else {
+                continue;
+            };
+            // Equal infinities are no contradiction.
+            if given != made && (given - made).abs() > ROUNDING * made.abs() {
+                return Err(wrong(&format!(
+                    "{} is {given}, but the other parameters make it {made}: leave one of them out",
+                    parameter.key()
+                )));
+            }
+        }
+        Ok(Self(model))
+    }
+
+    /// Structure, gain, lags, pole, pair and dead time: the process to the last bit.
+    fn state(&self) -> State {
+        let linear = self.0.linear();
+        let lag_s = |index: usize| linear.lags_s().get(index).copied().unwrap_or(1.0);
+        let [c1, c0] = linear.pair();
+        let name = linear.structure().name().to_owned();
+        let lags_s = [lag_s(0), lag_s(1)];
+        (
+            name,
+            linear.gain(),
+            lags_s,
+            linear.pole_per_s(),
+            [c1, c0],
+            linear.tau_s(),
+        )
+    }
+
+    #[staticmethod]
+    fn of_state(state: State) -> PyResult<Self> {
+        let (structure, gain, lags_s, pole_per_s, [c1, c0], tau_s) = state;
+        let of = Structure::from_name(&structure);
+        let of = of.ok_or_else(|| wrong(&format!("there is no structure {structure}")))?;
+        let linear = Linear::new(of)
+            .with_gain(gain)
+            .with_lags_s(lags_s)
+            .with_pole_per_s(pole_per_s)
+            .with_pair(c1, c0)
+            .with_tau_s(tau_s);
+        Ok(Self(linear.into()))
     }
 
     #[getter]
@@ -57,7 +113,7 @@ impl Model {
     /// Value of every parameter, by key.
     #[getter]
     fn parameters(&self) -> Vec<(&'static str, Option<f64>)> {
-        let of = |&parameter: &onecycle::Parameter| (parameter.key(), self.0.parameter(parameter));
+        let of = |&parameter: &Parameter| (parameter.key(), self.0.parameter(parameter));
         self.0.structure().parameters().iter().map(of).collect()
     }
 
@@ -86,34 +142,32 @@ impl Model {
         response.into_pyarray(py)
     }
 
-    /// Phase margin (rad), gain crossover (rad/s), gain margin, phase crossover (rad/s), delay margin (s), Ms and Mt.
-    fn margins(&self, gains: [f64; 5]) -> Option<Vec<Option<f64>>> {
-        let own = controller(gains);
+    /// Phase margin (rad), gain crossover (rad/s), gain margin, phase crossover (rad/s), delay margin (s), Ms and Mt. `None`: the loop
+    /// is unstable.
+    fn margins(&self, law: Law) -> Option<[Option<f64>; 7]> {
+        let own = Controller::from(law);
         let margins = onecycle::margins(&self.0, &own)?;
-        let peaks = onecycle::sensitivity(&self.0, &own);
-        Some(vec![
+        let peaks = onecycle::sensitivity(&self.0, &own)?;
+        Some([
             Some(margins.phase_margin_rad),
             Some(margins.gain_crossover_rad_per_s),
             margins.gain_margin,
             margins.phase_crossover_rad_per_s,
             Some(margins.delay_margin_s),
-            peaks.map(|peaks| peaks.ms),
-            peaks.map(|peaks| peaks.mt),
+            Some(peaks.ms),
+            Some(peaks.mt),
         ])
     }
 
     /// Time (s), output and input after a unit step of the reference.
-    fn step(&self, gains: [f64; 5]) -> PyResult<(Vec<f64>, Vec<f64>, Vec<f64>)> {
-        let own = controller(gains);
-        let response = onecycle::step_response(&self.0, &own).map_err(refused)?;
-        let rows = response.samples.iter();
-        let mut columns = (vec![], vec![], vec![]);
-        for sample in rows {
-            columns.0.push(sample.t_s);
-            columns.1.push(sample.y);
-            columns.2.push(sample.u);
-        }
-        Ok(columns)
+    fn step<'py>(&self, py: Python<'py>, law: Law) -> PyResult<[Bound<'py, PyArray1<f64>>; 3]> {
+        let response = onecycle::step_response(&self.0, &Controller::from(law));
+        let response = response.map_err(|error| wrong(&error.to_string()))?;
+        let rows = &response.samples;
+        let t: Vec<f64> = rows.iter().map(|at| at.t_s).collect();
+        let y = rows.iter().map(|at| at.y).collect();
+        let u = rows.iter().map(|at| at.u).collect();
+        Ok([t, y, u].map(|values| values.into_pyarray(py)))
     }
 
     /// Output at every tick from rest, under an input held over each tick.
@@ -124,14 +178,14 @@ impl Model {
         sample_s: f64,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         if !(sample_s.is_finite() && sample_s > 0.0) {
-            return Err(refused(format!(
+            return Err(wrong(&format!(
                 "the sample period {sample_s} s must be positive"
             )));
         }
         let process = self.0.linear();
         let steps = process.tau_s() / sample_s;
         if steps > MOST_STEPS {
-            return Err(refused(format!(
+            return Err(wrong(&format!(
                 "a dead time of {steps:.0} sample periods is too long: the limit is {MOST_STEPS:.0}"
             )));
         }

@@ -5,10 +5,15 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import duckdb
+import numpy as np
+import pandas
+import polars
 import pyarrow.parquet
 import pytest
 from distributed import Client, LocalCluster
@@ -93,6 +98,77 @@ def test_numbers_are_columns(recipe, tmp_path, client):
     for name in numbers:
         column = table.column(name).to_pylist()
         assert column == [None if value != value else value for value in frame[name][5:]], name
+
+
+@pytest.mark.parametrize("measure", ["relay", "identification"])
+def test_a_folder_is_one_table(measure, tmp_path, client):
+    path, out = tmp_path / "campaign.toml", tmp_path / "out"
+    # Noise of the size of the oscillation: cases are refused, and others not.
+    path.write_text(RECIPE.replace("0.02", "0.3") if measure == "identification" else SMALL[measure])
+    outcomes = onecycle.campaign(path, client=client, out=out, shard=1, cases=9)
+    assert {file.suffix for file in out.iterdir()} == {".parquet"}
+    assert len({tuple(pyarrow.parquet.read_schema(file).names) for file in out.iterdir()}) == 1
+    frame = outcomes.to_pandas()
+    of_pandas = pandas.read_parquet(out).set_index("n").sort_index()
+    of_polars = polars.read_parquet(out).sort("n")
+    of_duckdb = duckdb.sql(f"select * from '{out}/*.parquet' order by n").df().set_index("n")
+    assert set(of_pandas.columns) == set(frame.columns) | {"case"}
+    for name in frame:
+        values = [None if value != value else value for value in frame[name]]
+        assert of_polars[name].to_list() == values, name
+        assert [None if value != value else value for value in of_pandas[name].astype(object).fillna(np.nan)] == values, name
+        assert [None if value != value else value for value in of_duckdb[name].astype(object).fillna(np.nan)] == values, name
+
+
+def test_tasks_follow_the_workers_that_come(recipe):
+    with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        threading.Timer(1.0, cluster.scale, [3]).start()
+        most = []
+
+        def look(done, count):
+            most.append(sum(map(len, client.processing().values())))
+            # The first cases wait for all workers.
+            client.wait_for_workers(3)
+
+        outcomes = onecycle.campaign(recipe, client=client, shard=1, progress=look)
+        # With one worker that was known of it were four.
+        assert len(outcomes) == 24 and max(most) > 4
+
+
+def test_a_worker_of_another_build_is_refused(recipe, client):
+    from onecycle import _cluster
+
+    version, machine, code = _cluster.build()
+    _cluster.check((version, machine, code))
+    _cluster.check((version, "another machine", "0"))
+    for other in (("0.1.0", machine, code), (version, machine, "0")):
+        with pytest.raises(onecycle.OnecycleError, match="another build of onecycle"):
+            _cluster.check(other)
+    with pytest.raises(onecycle.OnecycleError, match="another build of onecycle"):
+        client.submit(_cluster.shard_cases, ("0.1.0", machine, code), RECIPE, (), 0, 1).result()
+
+
+def test_a_lost_scheduler_is_a_sentence(recipe, tmp_path):
+    out = tmp_path / "out"
+    server = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([*server, "--scheduler-file", str(tmp_path / "at")], stderr=subprocess.DEVNULL)
+    while not (tmp_path / "at").exists():
+        time.sleep(0.05)
+    address = json.loads((tmp_path / "at").read_text())["address"]
+    words = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-dashboard", "--nthreads", "1"]
+    worker = subprocess.Popen(words, stderr=subprocess.DEVNULL)
+    words = [sys.executable, "-m", "onecycle.campaign", str(recipe), "--scheduler", address, "--out", str(out), "--shard", "1"]
+    run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        while not list(out.glob("*.parquet")) and run.poll() is None:
+            time.sleep(0.01)
+        scheduler.kill()
+        _, told = run.communicate(timeout=120)
+        assert run.returncode == 3 and "error: the scheduler is lost" in told and "Traceback" not in told
+    finally:
+        for process in (run, worker, scheduler):
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.parametrize("measure", ["relay", "unknown", "recording", "honesty"])

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::words::with_options;
+use crate::words::as_shown;
 
 /// Widest line of remarks, as terminals are.
 const WIDTH: usize = 96;
@@ -16,7 +16,7 @@ pub fn wrapped(text: &mut String, lead: &str, words: &str) {
 pub(super) fn wrapped_to(text: &mut String, lead: &str, words: &str, width: usize) {
     let mut line = lead.to_owned();
     let mut is_first = true;
-    for word in with_options(words).split_ascii_whitespace() {
+    for word in as_shown(words).split_ascii_whitespace() {
         if !is_first && line.chars().count() + 1 + word.chars().count() > width {
             let _ = writeln!(text, "{line}");
             line = " ".repeat(lead.len());

@@ -176,7 +176,7 @@ pub(super) fn table<'a>(
         return Err(ReadError::NoPower);
     }
     let note = Note::Format {
-        format: form.format,
+        format: form.format.into(),
         columns: columns.len(),
     };
     let rows = Rows {

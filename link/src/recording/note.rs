@@ -1,5 +1,6 @@
 //! What a reader chose, assumed or dropped.
 
+use std::borrow::Cow;
 use std::fmt;
 
 use thiserror::Error;
@@ -11,6 +12,7 @@ use crate::time_unit::TimeUnit;
 ///
 /// A note is not an error. It derives `Error` only so that each clause stands at its variant.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Note {
     /// Which columns were read, and how they were chosen.
@@ -100,7 +102,7 @@ pub enum Note {
     #[error("the file is {format}, read as {}", counted(*.columns as u64, "column"))]
     Format {
         /// What it is, with an article.
-        format: &'static str,
+        format: Cow<'static, str>,
         /// Number of columns.
         columns: usize,
     },
@@ -310,6 +312,7 @@ pub enum Note {
 
 /// A cell of a recording; `Display` gives its place: `line 42 (3.97 s)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Cell {
     /// Its signal.
@@ -333,6 +336,7 @@ impl fmt::Display for Cell {
 
 /// What decided which column holds which signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ChosenBy {
     /// The caller named all of them.

@@ -1,4 +1,5 @@
-//! Requests from a map of settings, each a number, a text, or a list of numbers. A setting that is null or false is left out.
+//! Requests from a map of settings, each a number, a text, or a list of numbers. A setting that is null is left out, and so is a
+//! false one other than `design`.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -51,6 +52,8 @@ impl<'de, T: Settings> Visitor<'de> for Map<T> {
         while let Some((name, Text(value))) = map.next_entry::<String, Text>()? {
             match (name.as_str(), value) {
                 (_, None) => {}
+                // What a request does without being asked is the only thing that false takes out.
+                (name, Some(value)) if value == "false" && name != "design" => {}
                 ("schema", Some(value)) if value == SCHEMA => {}
                 ("schema", Some(_)) => {
                     return Err(A::Error::custom(format!("the schema must be {SCHEMA}")));
@@ -81,7 +84,7 @@ impl<'de> Visitor<'de> for TextVisitor {
     }
 
     fn visit_bool<E>(self, value: bool) -> Result<Self::Value, E> {
-        Ok(value.then(|| "true".to_owned()))
+        Ok(Some(value.to_string()))
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<Self::Value, E> {
@@ -163,8 +166,13 @@ mod tests {
         let list = vec![40.0, 0.0, 12.5].into_deserializer();
         let list: Result<_, Refusal> = Text::deserialize(list);
         assert_eq!(list.unwrap().0, Some("40,0,12.5".to_owned()));
-        let none: Result<_, Refusal> = Text::deserialize(false.into_deserializer());
-        assert_eq!(none.unwrap().0, None);
+        let of = |name: &'static str| {
+            Request::deserialize(MapDeserializer::<_, Refusal>::new(
+                [(name, false)].into_iter(),
+            ))
+        };
+        assert_eq!(of("write").unwrap(), Request::default());
+        assert!(of("design").unwrap().without_controllers);
     }
 
     #[test]

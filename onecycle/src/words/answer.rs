@@ -191,6 +191,8 @@ pub fn contradicted() -> (String, String) {
     (reason.to_owned(), next.to_owned())
 }
 
+pub const NONE_ASKED: &str = "the process is identified, and controllers were not asked for";
+pub const ASK_FOR_CONTROLLERS: &str = "leave out `design=false` for controllers";
 pub const NO_DESIGN: &str = "a process was found, and no controller keeps the limits on it";
 pub const COMPARE: &str =
     "Type these gains in and watch a step of the set-point. Gains in force: `against=KP,KI,KD`.";

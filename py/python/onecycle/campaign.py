@@ -1,16 +1,17 @@
 """`python -m onecycle.campaign FILE --scheduler ADDRESS --out FOLDER`: a campaign or a training set on a cluster."""
 
 import argparse
+import logging
 import sys
 
 
-def _bar(done, count):
+def _bar(done: int, count: int) -> None:
     if sys.stderr.isatty():
         end = "\n" if done >= count else ""
         print(f"\r{done} of {count}", end=end, file=sys.stderr, flush=True)
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m onecycle.campaign",
         description="Runs a campaign, or with --examples a training set, on Dask workers. The same command resumes an "
@@ -32,14 +33,16 @@ def main():
     from onecycle import OnecycleError
     from onecycle._cluster import fill, run
 
+    # A lost scheduler is told in a sentence.
+    logging.disable(logging.CRITICAL)
     try:
-        with Client(arguments.scheduler) as client:
+        with Client(arguments.scheduler) as client:  # type: ignore[no-untyped-call]
             if arguments.examples is not None:
                 fill(arguments.file, arguments.examples, arguments.out, client, _bar)
                 print(f"{arguments.examples} experiments in {arguments.out}")
                 return 0
             outcomes = run(arguments.file, client, arguments.out, arguments.shard, _bar, tuple(options))
-        print(outcomes.to_json() if arguments.json else outcomes, end="")
+        print(outcomes.to_json() if arguments.json else str(outcomes), end="")
     except (OnecycleError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 3

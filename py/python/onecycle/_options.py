@@ -1,0 +1,202 @@
+"""The settings of a request as keywords. One that is a word of Python ends with an underscore: `from_`."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
+from operator import index
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Union
+
+if TYPE_CHECKING:
+    from ._model import Controller
+
+Path = Union[str, "os.PathLike[str]"]
+#: A share of a whole: 0.05 or "5%".
+Share = Union[float, str]
+Structure = Literal[
+    "iptd", "integrator_lag", "double_integrator_lag", "soiptd", "toiptd", "foptd", "soptd", "toptd", "resonant", "resonant_lag"
+]
+
+
+class TableOptions(TypedDict, total=False):
+    """How a table is read."""
+
+    time: str | int
+    """Time column: its name, or its number from 1."""
+    input: str | int
+    """Column of the process input."""
+    output: str | int
+    """Column of the process output."""
+    set_point: str | int
+    """Column of the set-point of a closed loop."""
+    tag: str
+    """Control loop of a table with the signals of many, such as "LIC101"."""
+    sample_rate: float
+    """Samples per second (Hz), instead of a time column."""
+    time_unit: Literal["d", "h", "min", "s", "ms", "us", "ns"]
+    """Unit of the time column."""
+    dbc: str
+    """Path of the DBC file that names the signals of a CAN bus."""
+
+
+class LogOptions(TypedDict, total=False):
+    """The loop of a flight log."""
+
+    axis: Literal["roll", "pitch", "yaw"]
+    """Axis of the vehicle."""
+    loop: Literal["rate", "attitude", "altitude"]
+    """What the loop controls."""
+    flight: int
+    """Flight of the log, from 1; else the longest."""
+
+
+class PartOptions(TypedDict, total=False):
+    """The part of a recording."""
+
+    from_: float
+    """First time to use (s)."""
+    to: float
+    """Last time to use (s)."""
+
+
+class ControllerOptions(TypedDict, total=False):
+    """What is asked of a controller."""
+
+    style: Literal["paper", "sharp", "balanced", "calm"]
+    """Compromise between speed and robustness; else "balanced"."""
+    controller: Literal["p", "pi", "pd", "pid", "cascade_pi", "cascade_pid"]
+    """Its form."""
+    ms: float
+    """Limit of Ms and Mt, 1.05 to 10."""
+    phase_margin: float
+    """Least phase margin (deg)."""
+    gain_margin: float
+    """Least gain margin, as a factor."""
+    input_peak: float
+    """Largest controller output after a unit step of the reference (input unit)."""
+    overshoot: Share
+    """Largest overshoot, as a share of the step."""
+    sample_period: float
+    """Sample period of the controller (s); its output leaves one period after the sample."""
+    against: Controller | tuple[float, float, float] | tuple[float, float, float, float] | Path
+    """Gains in force to compare with: a controller, (kp, ki, kd) or (kp, ki, kd, filter_s), or a file that has them."""
+    vendor: str
+    """Controller that takes the gains, such as "klipper"."""
+    output_range: tuple[float, float] | str
+    """Range of its measurement, (0, 200) or "0..200"."""
+    input_range: tuple[float, float] | str
+    """Range of its output."""
+
+
+class DesignOptions(ControllerOptions, total=False):
+    """The keywords of `design`."""
+
+    noise: float
+    """Standard deviation of the measurement noise of one sample (output unit); needs `sample_period`."""
+    input_amplitude: float
+    """Amplitude of the input with which noise at the actuator is compared (input unit); else 1."""
+
+
+class EstimateOptions(PartOptions, ControllerOptions, total=False):
+    """The keywords of `identify` for a recording in memory."""
+
+    noise: Share
+    """Largest noise at the actuator, as a share of the input's amplitude."""
+    structure: Structure
+    """Structure of the process; else the simplest that explains the recording."""
+    hold: Literal["held", "interpolated"]
+    """Input between two samples; else the likelihood decides."""
+    input_late: float
+    """Time by which the input was logged late (s)."""
+    input_before: float
+    """Input before the first row, under which the process was at rest (input unit)."""
+    output_filter: float
+    """Cutoff of a low-pass that the output passed (Hz); 0 for none."""
+    beta: float
+    """Switching ratio of the relay, between -1 and 1."""
+    cycles: int
+    """Take the last cycles of a relay test, 1 to 50, with the estimator of the board."""
+    method: Literal["map", "refine", "classify"]
+    """Its method."""
+    pack: Path
+    """Its network."""
+
+
+class ReadOptions(TableOptions, LogOptions, PartOptions, total=False):
+    """The keywords of `read`."""
+
+
+class FlightOptions(LogOptions, EstimateOptions, total=False):
+    """The keywords of `identify_flight`."""
+
+    write: Path
+    """File for the parameters with the proposed gains; one that restores the old ones is written beside it."""
+    step: Share
+    """Share of the way to the proposed gains that is written; else 0.5."""
+    below_limits: bool
+    """Write gains that break a limit of the style."""
+
+
+class IdentifyOptions(TableOptions, FlightOptions, total=False):
+    """The keywords of `identify`."""
+
+    design: bool
+    """False leaves out the controllers to choose from."""
+
+
+def _text(name: str, value: Any) -> str:
+    """A value as the settings of the library have it."""
+    if getattr(value, "ndim", None) == 0:
+        # A scalar of NumPy.
+        value = value.item()
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    if hasattr(value, "kp"):
+        value = (value.kp, value.ki, value.kd, value.filter_s)
+    if isinstance(value, Iterable):
+        between = ".." if name.endswith("_range") else ","
+        return between.join(_text(name, one) for one in value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    try:
+        return str(index(value))
+    except TypeError:
+        pass
+    try:
+        return repr(float(value))
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} is a {type(value).__name__}: give a number or a text") from None
+
+
+def settings(function: str, kind: Any, given: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The given keywords as settings of the library. A TypeError names one that there is not."""
+    known = inspect.get_annotations(kind)
+    for name in given:
+        if name not in known:
+            near = get_close_matches(name, known, 1)
+            hint = f": do you mean {near[0]!r}?" if near else ""
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}{hint}")
+    return [(name.rstrip("_"), _text(name, value)) for name, value in given.items() if value is not None]
+
+
+def _source(annotation: Any) -> str:
+    return str(getattr(annotation, "__forward_arg__", annotation))
+
+
+F = TypeVar("F", bound=Callable[..., object])
+
+
+def keywords(kind: Any) -> Callable[[F], F]:
+    """Shows the keywords of `kind` in the signature and the documentation of a function that takes them as `**options`."""
+
+    def shown(function: F) -> F:
+        signature = inspect.signature(function)
+        fixed = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+        notes = inspect.get_annotations(kind)
+        named = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_source(notes[name])) for name in notes]
+        function.__signature__ = signature.replace(parameters=[*fixed, *named])  # type: ignore[attr-defined]
+        return function
+
+    return shown
