@@ -319,7 +319,7 @@ mod tests {
              `time_unit=us`, the most usual of these, or `time_unit=ms`",
         );
         assert_refused(
-            "t,y,u\n133000000000000000,1,1\n133000000000100000,2,1\n",
+            "t,y,u\n50000000000000000,1,1\n50000000000100000,2,1\n",
             "\"t\" (column 1) gives no unit of time: a step of 100000 is no usual sample period in any \
              unit; give `time_unit`, or the sample rate with `sample_rate`",
         );
