@@ -22,6 +22,9 @@ pub(crate) fn each<T: Send, R: Send>(items: Vec<T>, of: impl Fn(T) -> R + Sync +
 fn pool() -> Option<Arc<rayon::ThreadPool>> {
     static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
     let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    if cfg!(target_family = "wasm") {
+        return None;
+    }
     let process = std::process::id();
     if let Some((_, pool)) = kept.as_ref().filter(|(of, _)| *of == process) {
         return Some(Arc::clone(pool));
