@@ -4,8 +4,8 @@
 //! controller of least cost for that process is judged on the true one. The covariance is the one that our estimator states
 //! for its window and its prior, so both have seen the same data.
 
-use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_design::matrix::cholesky;
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::refine::{Refined, coordinate};
 use rand::SeedableRng;
