@@ -98,7 +98,7 @@ pub fn inverse<const N: usize>(mut a: Matrix<N>) -> Option<Matrix<N>> {
 /// A variance of zero (a recording without noise) gives a zero column. Rounding may make a pivot negative by 1e-9 of
 /// the variance.
 #[must_use]
-pub fn cholesky<const N: usize>(covariance: &[[f64; N]; N]) -> Option<[[f64; N]; N]> {
+pub fn cholesky<const N: usize>(covariance: &Matrix<N>) -> Option<Matrix<N>> {
     let mut root = [[0.0; N]; N];
     for i in 0..N {
         for j in 0..=i {

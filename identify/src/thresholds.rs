@@ -1,7 +1,7 @@
-//! Thresholds that decide a verdict or a remark, in one table: what it is and its unit, then what follows beyond it, then the
-//! campaign or argument that set it; "judgement" where there is none.
-//! How often each fires on right recordings stands in `docs/benchmarks/any-recording.md`
-//! (false alarms) and `docs/benchmarks/refusals.md`. Constants of a search or of a method stand where they are used.
+//! Thresholds that decide a verdict or a remark, in one table: what each is, with its unit; what follows beyond it; and the campaign or
+//! argument that set it. One that neither set says "judgement". How often each fires on right recordings stands in
+//! `docs/benchmarks/any-recording.md` (false alarms) and `docs/benchmarks/refusals.md`. Constants of a search or of a method stand
+//! where they are used.
 
 use onecycle_design::Parameter;
 

@@ -23,11 +23,12 @@ use crate::words::units::Units;
 const CHOSEN: f64 = 0.6;
 const IDENTIFIED: f64 = 0.9;
 
-/// What a source gives: the recording, the loop of the flight log that it is, and what was identified from it to choose its part.
+/// What a source gives: the recording, the loop of the flight log that it is, and how and what was identified from it to choose its
+/// part.
 struct Taken {
     recording: Recording,
     of_log: Option<LogLoop>,
-    found: Option<Identification>,
+    found: Option<(Identify<'static>, Identification)>,
 }
 
 impl From<Recording> for Taken {
@@ -158,7 +159,6 @@ impl Request {
             of_log,
             found,
         } = taken;
-        let in_table = asked;
         self.check_span(recording.time_s())?;
         let asked = set.law(asked);
         let asked = of_log.as_ref().map_or(asked, |of_log| {
@@ -170,14 +170,10 @@ impl Request {
         if let Some(file) = &self.pack {
             identify = identify.pack(usable(file)?);
         }
-        // As in the table of all loops, unless something else is asked for.
-        let is_found = of_log.as_ref().is_some_and(|of_log| {
-            let asked = of_log.specification(in_table, self.requirements.controller.is_some());
-            let of_table = survey::manner(asked, of_log.control_loop());
-            self.pack.is_none() && identify.is_set_like(&of_table)
-        });
-        let mut identification = match found.filter(|_| is_found) {
-            Some(found) => found,
+        // As for the choice of the part, unless something else is asked for.
+        let is_known = |how: &Identify<'_>| self.pack.is_none() && identify.is_set_like(how);
+        let mut identification = match found.filter(|(how, _)| is_known(how)) {
+            Some((_, found)) => found,
             None => part(0.0..IDENTIFIED, || identify.run(&recording)),
         };
         let in_force = || of_log.as_ref().and_then(LogLoop::in_force);

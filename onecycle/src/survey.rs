@@ -131,18 +131,20 @@ fn of_loop(
     Ok(one)
 }
 
-/// The part of a flight that tells most about a loop, as in the table of all loops, with what was identified from it; if none tells
-/// anything, from the first part to the last. `None`: no part is worth using.
+/// The part of a flight that tells most about a loop, as in the table of all loops, with how and what was identified from it; if none
+/// tells anything, from the first part to the last. `None`: no part is worth using.
 pub(crate) fn best_part(
     signals: &Signals,
     flight: &Flight,
     asked: &Specification,
-) -> Option<(Span, Option<Identification>)> {
+) -> Option<(Span, Option<(Identify<'static>, Identification)>)> {
     let (one, shown) = parts(signals, flight, asked);
     let spans = one.parts.iter().map(|part| part.span);
     match one.best() {
         Some(best) => {
-            let found = shown.into_iter().nth(best).map(|of| of.identification);
+            let how = manner(*asked, signals.control_loop);
+            let found = shown.into_iter().nth(best);
+            let found = found.map(|of| (how, of.identification));
             Some((one.parts[best].span, found))
         }
         None => Some((spans.reduce(Span::with)?, None)),
@@ -150,7 +152,7 @@ pub(crate) fn best_part(
 }
 
 /// How the parts of a flight are identified.
-pub(crate) fn manner(asked: Specification, of: ControlLoop) -> Identify<'static> {
+fn manner(asked: Specification, of: ControlLoop) -> Identify<'static> {
     let structure = log_gains::structure(of);
     Identify::new().specification(asked).structure(structure)
 }

@@ -15,16 +15,16 @@ pub(crate) fn each<T: Send, R: Send>(items: Vec<T>, of: impl Fn(T) -> R + Sync +
     }
 }
 
-/// The threads of this process. `None`: there are none to be had.
+/// The threads of this process. `None`: the system gives it none, as on a page.
 ///
 /// No thread lives on in a forked process, which would wait for those of its parent for ever, as it does with rayon's own pool.
 #[cfg(feature = "threads")]
 fn pool() -> Option<Arc<rayon::ThreadPool>> {
     static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
-    let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     if cfg!(target_family = "wasm") {
         return None;
     }
+    let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let process = std::process::id();
     if let Some((_, pool)) = kept.as_ref().filter(|(of, _)| *of == process) {
         return Some(Arc::clone(pool));

@@ -206,7 +206,7 @@ fn identify(py: Python<'_>, source: Source<'_>, settings: Settings) -> PyResult<
     found(report.map_err(|error| refused(&error))?)
 }
 
-/// Identifies on so many threads; 0: one for each core. The first error ends it.
+/// Identifies from every source, on this number of `threads`; 0 stands for one thread a core. The first error ends it.
 #[pyfunction]
 fn identify_many(
     py: Python<'_>,

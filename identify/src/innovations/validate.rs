@@ -99,7 +99,7 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) 
 /// Values less their mean.
 fn centred(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut column: Vec<f64> = values.collect();
-    let mean = column.iter().sum::<f64>() / column.len() as f64;
+    let mean = mean(&column);
     column.iter_mut().for_each(|v| *v -= mean);
     column
 }
@@ -114,7 +114,7 @@ pub(super) fn order_of_excitation(blocks: &Blocks<'_>, least: f64) -> usize {
     let longest = inputs.len() / (2 * LAGS);
     let rows = ((lag_s / blocks.block_s()).round() as usize).clamp(1, longest.max(1));
     let count = inputs.len().saturating_sub(LAGS * rows);
-    let mean = inputs.iter().sum::<f64>() / inputs.len() as f64;
+    let mean = mean(&inputs);
     let lagged = |lag: usize| inputs[lag * rows..][..count].iter();
     let columns: Vec<Vec<f64>> = (0..LAGS)
         .map(|lag| lagged(lag).map(|v| v - mean).collect())
@@ -220,7 +220,7 @@ pub(super) fn prediction(
         true => (0..whole.len()).filter_map(measured).collect(),
         false => pairs.iter().map(|(value, _)| *value).collect(),
     };
-    let mean = every.iter().sum::<f64>() / every.len() as f64;
+    let mean = mean(&every);
     let square: f64 = every.iter().map(|value| (value - mean).powi(2)).sum();
     let variance = square * count / every.len() as f64;
     let error: f64 = pairs

@@ -499,7 +499,7 @@ fn is_number(cell: &[u8]) -> bool {
 /// Whether a row is data: it holds a number, also one with its unit behind a time, or only words for a missing number such as NaN.
 fn is_data<'a>(cells: impl Iterator<Item = &'a [u8]> + Clone) -> bool {
     let filled = cells.filter(|cell| !number::bare(cell).is_empty());
-    // A line of dashes under a header is none.
+    // A line of dashes, which underlines a header, is no row of missing numbers.
     let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || !byte.is_ascii();
     let is_missing = |cell: &[u8]| {
         cell.iter().any(is_word) && matches!(number::parse(cell), Cell::Missing | Cell::Bad)

@@ -274,10 +274,6 @@ impl<'a> Table<'a> {
                 self.push_woven(&row, Stamp::Real(row.time_s))?;
             }
         }
-        let chosen = [self.choice.input, self.choice.output].into_iter();
-        let empty = chosen
-            .filter(|_| !self.preview.has_own_stamps())
-            .find(|column| !self.preview.column(*column).any(f64::is_finite));
         if let Some(mut weave) = self.weave.take() {
             self.builder.mark_own_stamps();
             if let Some(last) = weave.finish() {
@@ -289,9 +285,17 @@ impl<'a> Table<'a> {
             });
         }
         let recording = match self.builder.finish() {
-            Err(RecordingError::TooShort { .. }) if empty.is_some() => {
-                return Err(ReadError::NoNumber {
-                    column: self.preview.label(empty.unwrap_or_default()),
+            Err(error @ RecordingError::TooShort { .. }) => {
+                // A column without a number is the better reason.
+                let mut chosen = [self.choice.input, self.choice.output]
+                    .into_iter()
+                    .filter(|_| !self.preview.has_own_stamps());
+                let empty = chosen.find(|column| !self.preview.column(*column).any(f64::is_finite));
+                return Err(match empty {
+                    Some(column) => ReadError::NoNumber {
+                        column: self.preview.label(column),
+                    },
+                    None => error.into(),
                 });
             }
             finished => finished?.with_relay_beta(self.preview.relay_beta),

@@ -182,7 +182,7 @@ class Report(_Shown):
 
     @property
     def controller(self) -> Controller | None:
-        """The proposed controller with its execution; None if there is none."""
+        """The proposed controller with its execution; None if no controller keeps the limits or the process was refused."""
         made: Controller | None = self._data["controller"]
         return made
 
