@@ -47,6 +47,7 @@ LEFT_OUT = {
     "onecycle-lab train": "minutes to hours; by hand",
     "onecycle-lab reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/benchmarks/reproduction.md",
     "any_peers.py": "needs SIPPY and Octave",
+    "train_classifier.py": "needs PyTorch",
     "--method sippy": "needs SIPPY",
     "cargo install": "installs the program",
     "random_starts": "minutes; by hand",
@@ -66,7 +67,7 @@ LEFT_OUT = {
 FEW = {"campaign": ["--cases", "1"], "bench make": ["--cases", "2"], "fly": ["--seeds", "1"]}
 SMALLER = [(r"--check \d+", "--check 100"), (r"--deterioration \S+", "--deterioration 30%")]
 # Too long for a quick run whatever the options: their files and options are looked up.
-LOOKED_UP = ("train", "reproduce")
+LOOKED_UP = ("train", "reproduce", "dataset")
 
 
 def spans(text):

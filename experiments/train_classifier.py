@@ -2,13 +2,17 @@
 
     onecycle-lab dataset research/program/reproduction/literal.toml --into sets
     python experiments/train_classifier.py sets
+    python experiments/train_classifier.py sets --sizes --seeds 3      # a table of widths, depths and convolutions
 
 Layers, dropout, epochs, batch, learning rate and loss are those of the recipe (Adam, steps of the rate). The first loss of the
-recipe is learnt; --loss N takes another. Tried with Python 3.11, PyTorch 2.15, NumPy 2.4.
+recipe is learnt; --loss N takes another. Several folders give a row each. Each number of a row is the median over the seeds, with
+the range. Tried with Python 3.11 and 3.12, PyTorch 2.9 to 2.15, NumPy 2.
 """
 
 import argparse
 import json
+import statistics
+import sys
 import time
 from pathlib import Path
 
@@ -22,7 +26,39 @@ def load(folder, name, device):
     return [torch.from_numpy(array).to(device) for array in arrays]
 
 
-def layers(inputs, hidden, dropout, classes):
+# The paper tried models "of different depth and width up to four layers and 10000 neurons". Channels, width and stride of a
+# convolution stand before the layers; None: the dropout of the recipe.
+SIZES = [
+    ([], [100], None),
+    ([], [300, 100], None),
+    ([], [1000, 400], None),
+    ([], [3000, 1000], None),
+    ([], [3000, 1000], 0.0),
+    ([], [3000, 1000], 0.1),
+    ([], [3000, 1000], 0.6),
+    ([], [3000], None),
+    ([], [3000, 1000, 300], None),
+    ([], [3000, 1000, 300, 300], None),
+    ([], [10000], None),
+    ([], [10000, 1000], None),
+    ([(16, 31, 4), (32, 15, 4), (32, 7, 4)], [300], None),
+    ([(32, 31, 4), (64, 15, 4), (64, 7, 4)], [1000, 400], None),
+]
+
+
+def layers(inputs, convolutions, hidden, dropout, classes):
+    if convolutions:
+        yield torch.nn.Unflatten(1, (1, inputs))
+        before = 1
+        for channels, width, stride in convolutions:
+            convolution = torch.nn.Conv1d(before, channels, width, stride)
+            torch.nn.init.normal_(convolution.weight, std=(2.0 / (before * width)) ** 0.5)
+            torch.nn.init.zeros_(convolution.bias)
+            yield from (convolution, torch.nn.ReLU(), torch.nn.BatchNorm1d(channels))
+            before = channels
+            inputs = (inputs - width) // stride + 1
+        yield torch.nn.Flatten()
+        inputs *= before
     sizes = [inputs, *hidden]
     for before, after in zip(sizes, sizes[1:]):
         linear = torch.nn.Linear(before, after)
@@ -34,32 +70,22 @@ def layers(inputs, hidden, dropout, classes):
 
 
 def score(network, inputs, labels, costs):
-    """Accuracy; mean of J with its sign, mean of max(J, 0), largest J of the stable loops; number of unstable ones."""
+    """Accuracy, mean of J with its sign, mean of max(J, 0), largest J, all of the stable loops; number of unstable ones."""
     network.eval()
     with torch.no_grad():
-        picks = network(inputs).argmax(1)
+        picks = torch.cat([network(part).argmax(1) for part in inputs.split(2000)])
     j = costs.gather(1, picks[:, None])[:, 0]
     stable = j[torch.isfinite(j)]
     accuracy = (picks == labels).float().mean()
-    numbers = [accuracy, stable.mean(), stable.clamp(min=0).mean(), stable.max()]
-    text = ", ".join(f"{100 * float(number):.2f} %" for number in numbers)
-    return f"{text}, {len(j) - len(stable)} unstable"
+    return [float(x) for x in (accuracy, stable.mean(), stable.clamp(min=0).mean(), stable.max(), len(j) - len(stable))]
 
 
-def main():
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("folder", type=Path)
-    arguments.add_argument("--loss", type=int, default=0)
-    arguments.add_argument("--seed", type=int, default=1)
-    arguments.add_argument("--hidden", type=int, nargs="+")
-    arguments = arguments.parse_args()
-    recipe = json.loads((arguments.folder / "recipe.json").read_text())
-    device = "cuda" if torch.cuda.is_available() else "cpu"
-    torch.manual_seed(arguments.seed)
-    inputs, labels, costs = load(arguments.folder, "training", device)
-    hidden = arguments.hidden or recipe["hidden"]
-    network = torch.nn.Sequential(*layers(inputs.shape[1], hidden, recipe["dropout"], costs.shape[1])).to(device)
-    loss = recipe["losses"][arguments.loss]["loss"]
+def trained(recipe, training, loss, network, seed):
+    """The trained network, and the seconds that it took."""
+    inputs, labels, costs = training
+    torch.manual_seed(seed)
+    convolutions, hidden, dropout = network
+    network = torch.nn.Sequential(*layers(inputs.shape[1], convolutions, hidden, dropout, costs.shape[1])).to(inputs.device)
     gamma = torch.ones_like(costs)
     if loss != "cross_entropy":
         gamma += costs.clamp(0.0, loss["modified_softmax"]["cap"])
@@ -72,15 +98,61 @@ def main():
             group["lr"] = schedule["rate"] * step["factor"] ** (epoch // step["every"])
         network.train()
         size = min(recipe["batch"], len(labels))
-        for batch in torch.randperm(len(labels), device=device)[: len(labels) // size * size].split(size):
+        for batch in torch.randperm(len(labels), device=inputs.device)[: len(labels) // size * size].split(size):
             optimizer.zero_grad()
             torch.nn.functional.cross_entropy(gamma[batch] * network(inputs[batch]), labels[batch]).backward()
             optimizer.step()
-        if (epoch + 1) % 50 == 0:
-            print(f"epoch {epoch + 1}, {time.perf_counter() - begin:.0f} s on {device}", flush=True)
-    print("accuracy, mean J, mean of max(J, 0), largest J, unstable")
-    for path in sorted(arguments.folder.glob("*.npz")):
-        print(f"{path.stem:12} {score(network, *load(arguments.folder, path.stem, device))}")
+        if (epoch + 1) % 100 == 0:
+            print(f"epoch {epoch + 1}, {time.perf_counter() - begin:.0f} s", file=sys.stderr, flush=True)
+    # The device works ahead of the program: the score waits for it.
+    score(network, *training)
+    return network, time.perf_counter() - begin
+
+
+def spread(values, form):
+    """Median and range."""
+    middle, low, high = statistics.median(values), min(values), max(values)
+    return form(middle) if low == high else f"{form(middle)} ({form(low)} to {form(high)})"
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("folders", type=Path, nargs="+", metavar="FOLDER")
+    arguments.add_argument("--loss", type=int, default=0)
+    arguments.add_argument("--seeds", type=int, default=1)
+    sizes = arguments.add_mutually_exclusive_group()
+    sizes.add_argument("--hidden", type=int, nargs="+")
+    sizes.add_argument("--sizes", action="store_true", help="every network of SIZES")
+    arguments = arguments.parse_args()
+    device = "cuda" if torch.cuda.is_available() else "cpu"
+    name = torch.cuda.get_device_name() if device == "cuda" else f"CPU, {torch.get_num_threads()} threads"
+    print(f"Trained on: {name}, PyTorch {torch.__version__.split('+')[0]}\n")
+    print("| network | parameters | classes | verification: right | mean of max(J, 0) | largest J "
+          "| random: mean of max(J, 0) | largest J | unstable | training (s) |")
+    print("|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|")
+    percent = lambda value: f"{100 * value:.2f} %"
+    for folder in arguments.folders:
+        recipe = json.loads((folder / "recipe.json").read_text())
+        training, verification, *tests = [
+            load(folder, path, device)
+            for path in ["training", "verification", *sorted(path.stem for path in folder.glob("test*.npz"))]
+        ]
+        loss = recipe["losses"][arguments.loss]["loss"]
+        networks = SIZES if arguments.sizes else [([], arguments.hidden or recipe["hidden"], None)]
+        for convolutions, hidden, dropout in networks:
+            dropout = recipe["dropout"] if dropout is None else dropout
+            runs = []
+            for seed in range(1, arguments.seeds + 1):
+                network, took_s = trained(recipe, training, loss, (convolutions, hidden, dropout), seed)
+                known, random = score(network, *verification), score(network, *tests[0])
+                unstable = known[4] + random[4]
+                runs.append([known[0], known[2], known[3], random[2], random[3], unstable, took_s])
+            parameters = sum(weights.numel() for weights in network.parameters())
+            before = "".join(f"{channels} channels of {width}, " for channels, width, _ in convolutions)
+            forms = [percent] * 5 + [lambda value: f"{value:.0f}"] * 2
+            cells = [spread(values, form) for values, form in zip(zip(*runs), forms)]
+            print(f"| {before}{'-'.join(map(str, hidden))}, dropout {dropout:g} | {parameters:,} | {training[2].shape[1]} | "
+                  + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ use onecycle_design::{Parameter, Structure};
 use self::choose::NEARLY;
 use self::fitted::{Disturbances, Fitted};
 use self::mixture::Component;
-pub(crate) use self::orthogonal::Orthogonal;
+pub(crate) use self::orthogonal::{Orthogonal, dot};
 pub use self::plan::expected;
 use self::prepare::{FEWEST, Prepared, prepare};
 pub use self::record::Hold;
@@ -425,7 +425,13 @@ fn fit(
     })
 }
 
-/// What is known of a record before any fit.
+/// What is known of a recording before any fit. `None` if none can be made.
+pub(crate) fn recorded(signals: &Signals<'_>, options: &Options) -> Option<Recorded> {
+    let mut prepared = prepare(signals, options).ok()?;
+    let outliers = outliers::mark_far(&mut prepared.record);
+    Some(describe(&prepared, outliers))
+}
+
 fn describe(prepared: &Prepared, outliers: usize) -> Recorded {
     let record = &prepared.record;
     let deviation = |values: &[f64]| {

@@ -26,7 +26,7 @@ use crate::assumed::{RecordedLoop, recorded_filter};
 use crate::checks;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
-use crate::innovations::{Hold, gain_of};
+use crate::innovations::{self, Hold, gain_of};
 use crate::outcome::{Evidence, Fit, Identification, Identified, ResponsePoint, SetPointResponse};
 use crate::posterior::{self, Posterior};
 use crate::remark::Remark;
@@ -46,7 +46,7 @@ const LEAST_SIDE: f64 = 0.05;
 
 /// Identifies the process from a record with its set-point, one value for each point.
 ///
-/// `recorded`: what the likelihood found out about the record.
+/// `recorded`: what the likelihood found out about the record, if it was fitted before.
 #[must_use]
 pub fn identify_by_set_point(
     signals: &Signals<'_>,
@@ -55,7 +55,7 @@ pub fn identify_by_set_point(
     recorded: Option<Recorded>,
 ) -> Identification {
     let mut search = Search {
-        recorded,
+        recorded: recorded.or_else(|| innovations::recorded(signals, options)),
         remarks: vec![],
     };
     let outcome = search.run(signals, set_point, options);

@@ -22,6 +22,7 @@ mod assumed;
 mod checks;
 mod conclusion;
 pub mod cycles;
+mod descent;
 pub mod diagnose;
 mod excitation;
 mod innovations;

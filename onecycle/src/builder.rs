@@ -166,32 +166,54 @@ impl<'a> Identify<'a> {
     /// Identifies the process from `recording`. Cycles with a gap are not used.
     #[must_use]
     pub fn run(&self, recording: &Recording) -> Identification {
-        let filter_hz = self.options.output_filter_hz;
-        let options = (self.options)
-            .beta(self.options.beta.or(recording.relay_beta()))
-            .output_filter_hz(filter_hz.or(recording.output_filter_hz()))
-            .under_way(recording.is_of_a_flight_log());
+        let options = self.options_for(recording);
+        let pack = self.pack.as_ref();
         with_signals(recording, |signals| {
-            let calm = feedback::calm(recording, signals);
-            let mut found = match recording.set_point() {
+            let found = match recording.set_point() {
                 Some(set_point) if recording.is_of_a_flight_log() && !options.is_of_cycles() => {
-                    feedback::identify(signals, set_point, (&options, self.pack.as_ref()))
+                    feedback::identify(signals, set_point, (&options, pack))
                 }
-                _ => identify_by(signals, &options, self.pack.as_ref()),
+                _ => identify_by(signals, &options, pack),
             };
-            if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
-                found.outcome = Err(verdict);
-            }
-            if found.outcome.is_err() {
-                // Of a refused model nothing is proposed.
-                found.remarks.retain(|remark| {
-                    remark.about() != About::Controller
-                        && !matches!(remark, Remark::NoController(_))
-                });
-            }
-            found
+            judged(recording, signals, found)
         })
     }
+
+    /// Identifies the process of a flight from the response to its set-point alone. `None` if the set-point is no instrument.
+    pub(crate) fn run_on_response(&self, recording: &Recording) -> Option<Identification> {
+        let options = self.options_for(recording);
+        with_signals(recording, |signals| {
+            let found = feedback::identify_response(signals, recording.set_point()?, &options)?;
+            Some(judged(recording, signals, found))
+        })
+    }
+
+    /// The options with what a recording states itself.
+    fn options_for(&self, recording: &Recording) -> Options {
+        let filter_hz = self.options.output_filter_hz;
+        (self.options)
+            .beta(self.options.beta.or(recording.relay_beta()))
+            .output_filter_hz(filter_hz.or(recording.output_filter_hz()))
+            .under_way(recording.is_of_a_flight_log())
+    }
+}
+
+/// Refuses a flight that was too calm, and proposes nothing of a refused model.
+fn judged(
+    recording: &Recording,
+    signals: &Signals<'_>,
+    mut found: Identification,
+) -> Identification {
+    let calm = feedback::calm(recording, signals);
+    if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
+        found.outcome = Err(verdict);
+    }
+    if found.outcome.is_err() {
+        found.remarks.retain(|remark| {
+            remark.about() != About::Controller && !matches!(remark, Remark::NoController(_))
+        });
+    }
+    found
 }
 
 /// Calls `read` with the columns of a recording, in the form that the functions of `onecycle-identify` take.

@@ -68,9 +68,7 @@ pub(crate) fn identify(
     let options = &options.under_feedback();
     let mut direct = part(0.0..DIRECT, || identify_by(signals, options, pack));
     let caused = caused_by_set_point(signals, set_point);
-    let follows = |caused: &Caused| caused.output_gain >= LEAST_GAIN;
-    let share = (caused.as_ref().filter(|caused| follows(caused)))
-        .map_or(0.0, |caused| caused.output_share);
+    let share = share_of(caused.as_ref());
     let Some(caused) = caused.filter(|_| share >= LEAST_SHARE) else {
         if direct.outcome.is_ok() && explained(&direct) < BEYOND_DOUBT {
             direct.outcome = Err(Verdict::NotExcited { share });
@@ -105,6 +103,24 @@ pub(crate) fn identify(
         (Ok(one), Ok(other)) if stands && agree(one, other) => found,
         _ => by_spectra,
     }
+}
+
+/// Identifies the process from the response to the set-point alone. `None` if the set-point is no instrument.
+pub(crate) fn identify_response(
+    signals: &Signals<'_>,
+    set_point: &[f64],
+    options: &Options,
+) -> Option<Identification> {
+    let share = share_of(caused_by_set_point(signals, set_point).as_ref());
+    let options = &options.under_feedback();
+    let found = || identify_by_set_point(signals, set_point, options, None);
+    (share >= LEAST_OF_RESPONSE).then(found)
+}
+
+/// Share of the output's variance that the set-point causes, if the output follows it.
+fn share_of(caused: Option<&Caused>) -> f64 {
+    let following = caused.filter(|caused| caused.output_gain >= LEAST_GAIN);
+    following.map_or(0.0, |caused| caused.output_share)
 }
 
 /// The fit to the input as it is, `direct`, or to the part of it that the set-point caused.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use onecycle_design::{Parameter, Specification, Structure};
 use onecycle_identify::progress::{one_of, part};
 use onecycle_identify::{Identification, Identified, Verdict};
-use onecycle_link::{Change, ControlLoop, Flight, Signals, Span};
+use onecycle_link::{Change, ControlLoop, Flight, Recording, Signals, Span};
 
 use crate::answer;
 use crate::builder::Identify;
@@ -171,11 +171,7 @@ fn parts(signals: &Signals, flight: &Flight, asked: &Specification) -> (FlightLo
     let is_refused = |(_, shown): &(_, Shown)| shown.identification.outcome.is_err();
     if spans.len() > 1 && all.iter().all(is_refused) {
         let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
-        let shown = identified(&signals.part(whole), asked).filter(|shown| {
-            let found = shown.identification.outcome.as_ref().ok();
-            found.is_some_and(|found| found.fit.set_point_response().is_some())
-        });
-        all.extend(shown.map(|shown| (whole, shown)));
+        all.extend(by_response(&signals.part(whole), asked).map(|shown| (whole, shown)));
     }
     let part = |(span, shown): &(Span, Shown)| {
         let found = match &shown.identification.outcome {
@@ -208,24 +204,33 @@ fn parts(signals: &Signals, flight: &Flight, asked: &Specification) -> (FlightLo
 /// What was identified from a part. `None`: its signals make no recording.
 fn identified(part: &Signals, asked: &Specification) -> Option<Shown> {
     let recording = part.recording().ok()?;
-    let mut identification = manner(*asked, part.control_loop).run(&recording);
-    // Of several parts one that knows its gain to less than a factor of two tells nothing.
+    let identification = manner(*asked, part.control_loop).run(&recording);
+    Some(shown(recording, identification))
+}
+
+/// What the response to the set-point tells of a part. `None`: nothing.
+fn by_response(part: &Signals, asked: &Specification) -> Option<Shown> {
+    let recording = part.recording().ok()?;
+    let identification = manner(*asked, part.control_loop).run_on_response(&recording)?;
+    let shown = shown(recording, identification);
+    shown.identification.outcome.is_ok().then_some(shown)
+}
+
+/// Of several parts one that knows its gain to less than a factor of two tells nothing.
+fn shown(recording: Recording, mut identification: Identification) -> Shown {
     let tells = |found: &Identified| {
         let gain = found.effectiveness();
         gain.is_none_or(|[low, _, high]| high < MOST_RATIO * low)
     };
-    if identification
-        .outcome
-        .as_ref()
-        .is_ok_and(|found| !tells(found))
-    {
+    let found = identification.outcome.as_ref();
+    if found.is_ok_and(|found| !tells(found)) {
         identification.refuse(Verdict::TooUncertain);
     }
-    Some(Shown {
+    Shown {
         recording,
         identification,
         gains: None,
-    })
+    }
 }
 
 /// What is shown of a process. `None`: its gain has no interval.

@@ -6,7 +6,7 @@ use std::path::Path;
 use onecycle::Structure;
 use serde_json::Value;
 
-use crate::common::{Scratch, Table, identify, run, simulate};
+use crate::common::{Scratch, Table, identify, run, run_once, simulate};
 
 fn document() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/identify-json.md");
@@ -89,7 +89,7 @@ fn the_documented_keys_are_those_of_the_report() {
         &mut found,
     );
     let acro = log.replace("px4_chirps.ulg", "betaflight_acro_long.bbl");
-    let by_response = run(&["identify", &acro, "--axis", "yaw", "--json"]).stdout;
+    let by_response = run_once(&["identify", &acro, "--axis", "yaw", "--json"]).stdout;
     let by_response: Value = serde_json::from_str(&by_response).unwrap();
     keys(&by_response["fit"], "fit", &mut found);
     // Those of the three columns of the answer are documented once.

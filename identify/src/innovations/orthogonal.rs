@@ -119,7 +119,7 @@ impl Orthogonal {
 }
 
 /// Sum of the products of two columns.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Eight sums side by side, so that the compiler uses vector registers.
     let mut sums = [0.0; 8];
     let (wide_a, rest_a) = a.as_chunks::<8>();

@@ -8,6 +8,8 @@
 //!
 //! [`Bin::errors`]: super::spectra::Bin::errors
 
+use std::ops::Range;
+
 use num_complex::Complex64;
 use onecycle_design::{Linear, Structure};
 use rand::{RngExt, SeedableRng};
@@ -15,15 +17,17 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use super::spectra::Spectra;
-use onecycle_design::matrix::cholesky;
+use crate::descent::{LeastSquares, Normal, Patience, descend};
+use onecycle_design::matrix::{cholesky, identity};
 
 /// Most unknowns: gain, two lags or a lag and a pair, a pole, dead time.
 const MOST: usize = 6;
 /// Starts from which a structure is fitted.
 const MOST_STARTS: usize = 10;
-/// Steps of a descent, and the decrease below which it ends.
-const STEPS: usize = 60;
-const DECREASE: f64 = 1e-7;
+const PATIENCE: Patience = Patience {
+    steps: 60,
+    decrease: 1e-7,
+};
 /// Largest change of a gain's logarithm: the errors of a response of any gain are finite.
 const FARTHEST: f64 = 5.0;
 /// Steps of the chain that are not used, and that are.
@@ -43,6 +47,13 @@ impl Point {
     fn count(structure: Structure) -> usize {
         let stages = structure.stages();
         2 + stages.lags + stages.poles + 2 * stages.pairs
+    }
+
+    /// Unknowns that are not below zero.
+    fn poles_and_pairs(&self) -> Range<usize> {
+        let stages = self.structure.stages();
+        let first = 1 + stages.lags;
+        first..first + stages.poles + 2 * stages.pairs
     }
 
     pub(super) fn process(&self) -> Linear {
@@ -124,7 +135,13 @@ impl Problem<'_> {
             .collect();
         starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         starts.truncate(MOST_STARTS);
-        let ends = starts.into_iter().map(|start| self.descend(start));
+        let ends = starts.into_iter().map(|start| {
+            let mut descent = Descent {
+                problem: self,
+                from: start.point,
+            };
+            descend(&mut descent, start, PATIENCE)
+        });
         ends.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
@@ -245,86 +262,22 @@ impl Problem<'_> {
         steps
     }
 
-    /// Levenberg and Marquardt's descent.
-    fn descend(&self, start: Candidate) -> Candidate {
-        let from = start.point;
-        let mut here = start;
-        let mut damping = 1e-2;
-        for _ in 0..STEPS {
-            let (matrix, gradient) = self.normal(&here.point);
-            let mut next = None;
-            while next.is_none() && damping < 1e8 {
-                next = self.step((&here, &from), (&matrix, &gradient), damping);
-                damping *= if next.is_some() { 0.2 } else { 5.0 };
-            }
-            let Some(better) = next else {
-                break;
-            };
-            let decrease = (here.cost - better.cost) / here.cost;
-            here = better;
-            if decrease < DECREASE {
-                break;
-            }
-        }
-        here
-    }
-
-    /// Normal equations, scaled by [`Self::steps`].
-    fn normal(&self, point: &Point) -> ([[f64; MOST]; MOST], [f64; MOST]) {
-        let errors = self.errors(&point.process());
+    /// Columns of the Jacobian in the units of [`Self::steps`].
+    fn columns(&self, point: &Point, errors: &[f64]) -> Vec<Vec<f64>> {
         let steps = self.steps(point.structure);
-        let columns: Vec<Vec<f64>> = (steps.iter().enumerate())
+        (steps.iter().enumerate())
             .map(|(index, step)| {
                 let mut moved = *point;
                 moved.values[index] += step;
                 let moved = self.errors(&moved.process());
-                moved.iter().zip(&errors).map(|(a, b)| a - b).collect()
+                moved.iter().zip(errors).map(|(a, b)| a - b).collect()
             })
-            .collect();
-        let mut matrix = [[0.0; MOST]; MOST];
-        let mut gradient = [0.0; MOST];
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        for (i, column) in columns.iter().enumerate() {
-            gradient[i] = dot(column, &errors);
-            for (j, other) in columns.iter().enumerate() {
-                matrix[i][j] = dot(column, other);
-            }
-        }
-        for (i, row) in matrix.iter_mut().enumerate().skip(columns.len()) {
-            row[i] = 1.0;
-        }
-        (matrix, gradient)
+            .collect()
     }
 
-    /// A damped step. `None` if it leaves the box or does not lower the cost.
-    fn step(
-        &self,
-        (here, from): (&Candidate, &Point),
-        (matrix, gradient): (&[[f64; MOST]; MOST], &[f64; MOST]),
-        damping: f64,
-    ) -> Option<Candidate> {
-        let mut damped = *matrix;
-        for (i, row) in damped.iter_mut().enumerate() {
-            row[i] *= 1.0 + damping;
-        }
-        let change = solve(&cholesky(&damped)?, gradient);
-        let mut point = here.point;
-        let steps = self.steps(point.structure);
-        for ((value, change), step) in point.values.iter_mut().zip(change).zip(steps) {
-            *value -= change * step;
-        }
-        self.nearest_inside(&mut point);
-        let cost = self.cost(&point.process());
-        (cost < here.cost && self.is_inside(&point, from)).then_some(Candidate { point, cost })
-    }
-
-    /// Moves a pole or a second-order stage onto its bound of zero.
-    fn nearest_inside(&self, point: &mut Point) {
-        let stages = point.structure.stages();
-        let first = 1 + stages.lags;
-        for value in &mut point.values[first..first + stages.poles + 2 * stages.pairs] {
-            *value = value.max(0.0);
-        }
+    fn normal(&self, point: &Point) -> Normal {
+        let errors = self.errors(&point.process());
+        Normal::new(&self.columns(point, &errors), &errors)
     }
 
     /// Processes drawn from the posterior about a fit, for flat priors of the unknowns: a Metropolis chain with steps of the
@@ -332,7 +285,11 @@ impl Problem<'_> {
     pub(super) fn draws(&self, best: &Candidate, temper: f64, count: usize) -> Vec<Linear> {
         let structure = best.structure();
         let unknowns = Point::count(structure);
-        let (matrix, _) = self.normal(&best.point);
+        let normal = self.normal(&best.point);
+        let mut matrix = identity();
+        for (row, known) in matrix.iter_mut().zip(&normal.matrix) {
+            row[..unknowns].copy_from_slice(known);
+        }
         let Some(root) = cholesky(&matrix).filter(|root| (0..MOST).all(|i| root[i][i] > 0.0))
         else {
             return vec![];
@@ -369,16 +326,44 @@ impl Problem<'_> {
     }
 }
 
-/// Solution of `L L' x = right`.
-fn solve(root: &[[f64; MOST]; MOST], right: &[f64; MOST]) -> [f64; MOST] {
-    let mut x = *right;
-    for i in 0..MOST {
-        for j in 0..i {
-            x[i] -= root[i][j] * x[j];
-        }
-        x[i] /= root[i][i];
+/// A descent from a point, which it does not leave too far.
+struct Descent<'a> {
+    problem: &'a Problem<'a>,
+    from: Point,
+}
+
+impl LeastSquares for Descent<'_> {
+    type Point = Candidate;
+
+    fn normal(&mut self, at: &Candidate) -> Option<Normal> {
+        Some(self.problem.normal(&at.point))
     }
-    backwards(root, &x)
+
+    /// A pole or a second-order stage is not below zero.
+    fn is_held(&self, at: &Candidate, index: usize, gradient: f64) -> bool {
+        at.point.poles_and_pairs().contains(&index)
+            && at.point.values[index] <= 0.0
+            && gradient > 0.0
+    }
+
+    fn moved(&mut self, from: &Candidate, change: &[f64]) -> Option<Candidate> {
+        let mut point = from.point;
+        let steps = self.problem.steps(point.structure);
+        for ((value, change), step) in point.values.iter_mut().zip(change).zip(steps) {
+            *value += change * step;
+        }
+        let bounded = point.poles_and_pairs();
+        for value in &mut point.values[bounded] {
+            *value = value.max(0.0);
+        }
+        let cost = self.problem.cost(&point.process());
+        let is_inside = self.problem.is_inside(&point, &self.from);
+        is_inside.then_some(Candidate { point, cost })
+    }
+
+    fn decrease(&self, from: &Candidate, to: &Candidate) -> f64 {
+        (from.cost - to.cost) / from.cost
+    }
 }
 
 /// Solution of `L' x = right`.
