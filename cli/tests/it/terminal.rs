@@ -139,7 +139,12 @@ fn a_card_fits_its_terminal() {
     let (loop_lines, flight_lines) = ([30, 24], [40, 40]);
     for (folder, arguments, all_columns, lines) in [
         (&here, "noisy.csv", &[60, 80, 120, 200][..], loop_lines),
-        (&logs, "ap_sysid_roll.bin --axis roll", &[60, 80], loop_lines),
+        (
+            &logs,
+            "ap_sysid_roll.bin --axis roll",
+            &[60, 80],
+            loop_lines,
+        ),
         (&logs, "ap_sysid_roll.bin", &[60, 80], flight_lines),
     ] {
         for &columns in all_columns {
