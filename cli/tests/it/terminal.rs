@@ -142,10 +142,10 @@ fn a_card_fits_its_terminal() {
         (
             &logs,
             "ap_sysid_roll.bin --axis roll",
-            &[60, 80],
+            &[60, 80][..],
             loop_lines,
         ),
-        (&logs, "ap_sysid_roll.bin", &[60, 80], flight_lines),
+        (&logs, "ap_sysid_roll.bin", &[60, 80][..], flight_lines),
     ] {
         for &columns in all_columns {
             let Some(text) = on_a_terminal(folder, arguments, columns, None) else {
