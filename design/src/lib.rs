@@ -87,8 +87,8 @@ pub use soiptd_pd::step_metrics::StepMetrics;
 pub use soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
 pub use tuning::{
     Assessment, Comparison, Design, DesignError, Effect, FELT, Felt, LeastMargins, Limit,
-    MeasurementNoise, Missed, Proposal, Robustness, Specification, Style, assess, design,
-    design_over, forms, least_margins, proposals, reference_filter_s,
+    MeasurementNoise, Missed, Proposal, Responses, Robustness, Specification, Style, assess,
+    assess_and_simulate, design, design_over, forms, least_margins, proposals, reference_filter_s,
 };
 
 // Compiles and runs the code of the README.

@@ -38,7 +38,10 @@ use crate::soiptd_pd;
 pub use comparison::{Comparison, Effect, FELT, Felt};
 pub use missed::{Limit, Missed, reference_filter_s};
 pub use outcome::{Design, DesignError, Robustness};
-pub use proposal::{Assessment, LeastMargins, Proposal, assess, forms, least_margins, proposals};
+pub use proposal::{
+    Assessment, LeastMargins, Proposal, Responses, assess, assess_and_simulate, forms,
+    least_margins, proposals,
+};
 pub use specification::{MeasurementNoise, Specification, Style};
 
 /// Number of draws that [`design_over`] needs. If the loss varies as much as its mean, the mean of 96 draws has a

@@ -155,7 +155,15 @@ struct Verdict {
 struct Process {
     structure: &'static str,
     #[serde(flatten)]
-    parameters: Parameters<Interval>,
+    parameters: Parameters<Known>,
+}
+
+/// What is known of a parameter, and its symbol in this structure.
+#[derive(Serialize)]
+struct Known {
+    symbol: &'static str,
+    #[serde(flatten)]
+    interval: Interval,
 }
 
 /// Values by the keys of their parameters, in the order of the structure.
@@ -402,14 +410,15 @@ fn verdict(found: &Identification) -> Verdict {
 }
 
 fn process(identified: &Identified) -> Process {
+    let structure = identified.model.structure();
     let intervals = identified.estimate.iter();
+    let known = |(parameter, interval): (crate::Parameter, _)| {
+        let symbol = parameter.symbol_in(structure);
+        (parameter.key(), Known { symbol, interval })
+    };
     Process {
-        structure: identified.model.structure().name(),
-        parameters: Parameters(
-            intervals
-                .map(|(parameter, interval)| (parameter.key(), interval))
-                .collect(),
-        ),
+        structure: structure.name(),
+        parameters: Parameters(intervals.map(known).collect()),
     }
 }
 

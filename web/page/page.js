@@ -417,16 +417,8 @@ const identify = async () => {
   showResult();
 };
 at("identify").onclick = identify;
-// Lags of a process that is no body with its actuator: as the program calls them.
-const LAGS = {
-  foptd: { t_body_s: "T (s)", k_over_t_body: "K/T" }, integrator_lag: { t_prop_s: "T (s)" }, resonant_lag: { t_prop_s: "T (s)" },
-  soptd: { t_body_s: "T1 (s)", k_over_t_body: "K/T1", t_prop_s: "T2 (s)" },
-  toptd: { t_body_s: "T1 (s)", k_over_t_body: "K/T1", t_prop_s: "T2 (s)", t_prop2_s: "T3 (s)" },
-};
-const SYMBOLS = {
-  k: "K", k_over_t_body: "K/T_body", t_prop_s: "T_prop (s)", t_prop2_s: "T_prop2 (s)", t_body_s: "T_body (s)", tau_s: "tau (s)",
-  natural_frequency_rad_per_s: "w0 (rad/s)", zeta: "zeta", input_bias: "input bias",
-};
+// Units of time are at the end of a key.
+const unitOf = (key) => /rad_per_s$/.test(key) ? " (rad/s)" : /_s$/.test(key) ? " (s)" : "";
 const showResult = () => {
   const isFound = report.verdict.kind === "identified";
   say(`${isFound ? "Identified" : "No process identified"} in ${took()}.`);
@@ -439,7 +431,7 @@ const showResult = () => {
   const of = (name, value) => report.below?.includes(name) ? [`below ${shown(value.high)}`, "", ""] : [value.estimate, value.low, value.high].map((end) => shown(end));
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
   at("parameters").hidden = !rows.length;
-  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([LAGS[report.structure]?.[name] ?? SYMBOLS[name] ?? name.replaceAll("_", " "), ...of(name, value)])));
+  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([value.symbol + unitOf(name), ...of(name, value)])));
   const groups = [["Remarks", report.remarks], ["Details", report.details]];
   at("remarks").replaceChildren(...groups.filter(([, all]) => all.length).flatMap(([title, all]) => {
     const list = make("ul");

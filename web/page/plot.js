@@ -29,7 +29,7 @@ const plots = (() => {
   // circles: [{ at, radius }], marks: [{ at, text }], square }
   const draw = (place, of) => {
     const width = Math.max(place.clientWidth, 150), isSmall = width < 240;
-    const height = of.height ?? (of.square ? Math.min(width, 380) : isSmall ? 165 : 230);
+    const height = of.height ?? (of.square ? Math.min(width, 380) : isSmall ? 165 : innerHeight < 700 ? 190 : 230);
     const [left, right, top, bottom] = [isSmall ? 44 : 54, isSmall ? 2 : 10, 8, 38];
     const [w, h] = [width - left - right, height - top - bottom];
     let { xs, ys } = of;

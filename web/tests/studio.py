@@ -481,7 +481,10 @@ def answered(browser, told):
     named = lambda: [row.split("\t") for row in page.inner_text("#named tbody").splitlines()]
     expect([row[0] for row in named()][:3] == ["Kp", "Ki", "Kd"], named())
     expect(not page.evaluate("document.getElementById('settings-panel').open"), "the settings are folded")
-    in_sight(page, ("#verdict", "#named", "#calm", "#step svg", "#load svg"))
+    for width, height in ((1440, 900), (1366, 657)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.evaluate("scrollTo(0, 0)")
+        in_sight(page, ("#verdict", "#named", "#calm", "#step svg", "#load svg"))
     # A flight: the card of the program, and the share of the work that is done.
     page.evaluate("""window.shares = []; new MutationObserver(() => { const { value } = document.getElementById("progress");
         if (document.getElementById("progress").hasAttribute("value")) shares.push([value, document.getElementById("state").textContent]); })

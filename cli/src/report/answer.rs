@@ -1,5 +1,6 @@
 //! The answer as text: a card of at most 24 lines of 80 columns, for any terminal of 60 columns or more.
 
+use std::borrow::Cow;
 use std::fmt::Write;
 
 use onecycle::{Estimate, Identified, Interval, Parameter};
@@ -15,9 +16,9 @@ use crate::words::answer as words;
 /// Width of a card without a terminal, and the narrowest and widest one in a terminal.
 const WIDTH: usize = 80;
 const WIDTHS: (usize, usize) = (60, 100);
-/// Columns of names and of values.
+/// Columns of names, in the narrowest terminal one less, and of values, with a blank before each.
 const NAME: usize = 20;
-const VALUE: usize = 13;
+const VALUE: usize = 12;
 
 /// A blank at which no line ends.
 const TOGETHER: &str = "\u{a0}";
@@ -35,7 +36,7 @@ pub(super) fn card(
     process: Option<(&Identified, &Units)>,
     more: Option<usize>,
 ) -> String {
-    let mut text = format!("{}\n", painted(HEADING, title));
+    let mut text = heading(title);
     verdict(&mut text, "", answer.verdict, &answer.reason);
     if !answer.gains.is_empty() {
         text.push('\n');
@@ -65,6 +66,17 @@ pub(super) fn card(
     text
 }
 
+/// The name of a file and what it is, on two lines where they do not fit on one.
+pub(super) fn heading(title: &str) -> String {
+    let is_wide = title.chars().count() > width();
+    let title = if is_wide {
+        Cow::Owned(title.replacen("  ", "\n  ", 1))
+    } else {
+        Cow::Borrowed(title)
+    };
+    format!("{}\n", painted(HEADING, &title))
+}
+
 /// The verdict and its reason, wrapped.
 pub(super) fn verdict(text: &mut String, lead: &str, of: Advice, reason: &str) {
     let style = match of {
@@ -79,8 +91,13 @@ pub(super) fn verdict(text: &mut String, lead: &str, of: Advice, reason: &str) {
 }
 
 pub(super) fn line(text: &mut String, name: &str, words: &str) {
+    fitted(text, &format!("{name:<9}"), words);
+}
+
+/// Words behind `lead`, wrapped.
+pub(super) fn fitted(text: &mut String, lead: &str, words: &str) {
     let mut lines = String::new();
-    wrapped_to(&mut lines, &format!("{name:<9}"), words, width());
+    wrapped_to(&mut lines, lead, words, width());
     text.push_str(&lines.replace(TOGETHER, " "));
 }
 
@@ -137,11 +154,17 @@ fn shown<T>(has_now: bool, values: [T; 3]) -> impl Iterator<Item = T> {
 }
 
 fn row(text: &mut String, name: &str, values: impl Iterator<Item = String>, unit: &str) {
-    let mut line = format!("  {name:<NAME$}");
-    for value in values {
-        let _ = write!(line, "{value:>VALUE$}");
+    let values: String = values.map(|value| format!(" {value:>VALUE$}")).collect();
+    let names = NAME.min(width() - 3 * (VALUE + 1) - 2);
+    let line = |name: &str, unit: &str| {
+        let line = format!("  {name:<names$}{values}  {unit}");
+        line.trim_end().to_owned()
+    };
+    let mut shown = line(name, unit);
+    if shown.chars().count() > width() {
+        shown = line(&format!("{name} ({unit})"), "");
     }
-    let _ = writeln!(text, "{}", format!("{line}  {unit}").trim_end());
+    let _ = writeln!(text, "{shown}");
 }
 
 /// A gain: integers of a firmware as they are.

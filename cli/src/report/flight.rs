@@ -7,7 +7,7 @@ use super::number::short;
 use super::wrap::wrapped;
 use crate::results::answer::Advice;
 use crate::results::flight::{FlightLoop, Judged, Refusal, Survey};
-use crate::style::{HEADING, headed, painted};
+use crate::style::headed;
 use crate::words::answer as answers;
 use crate::words::controllers;
 use crate::words::flight as words;
@@ -40,9 +40,9 @@ pub fn text(of: &Survey, has_details: bool) -> String {
 /// What to do about every loop: at most 40 lines.
 fn card(of: &Survey, has_details: bool) -> String {
     let title = format!("{}  {}, flight {}", of.file, of.firmware, of.number);
-    let mut text = format!("{}\n", painted(HEADING, &title));
+    let mut text = answer::heading(&title);
     if of.loops.is_empty() {
-        wrapped(&mut text, "", words::NOTHING_LOGGED);
+        answer::fitted(&mut text, "", words::NOTHING_LOGGED);
         return text;
     }
     let mut has_titles = false;
@@ -58,10 +58,11 @@ fn card(of: &Survey, has_details: bool) -> String {
             has_titles = true;
         }
         if let Some((gain, delay)) = process(one) {
-            let _ = writeln!(text, "  {:<20} {gain}, delay {delay}", "process");
+            let words = format!("{gain}, delay {delay}");
+            answer::fitted(&mut text, &format!("  {:<20} ", "process"), &words);
         }
         if let Some(Err(reason)) = &one.to_write {
-            wrapped(&mut text, "  not written: ", reason);
+            answer::fitted(&mut text, "  not written: ", reason);
         }
     }
     answer::line(&mut text, "Next", &next(of));

@@ -2,12 +2,9 @@
 
 use onecycle::json::controller as controller_json;
 use onecycle::json::controllers::{Figures, Least};
-use onecycle::{
-    Assessment, Controller, Model, Specification, assess, least_margins, load_response,
-    step_response,
-};
+use onecycle::{Assessment, Controller, Model, Specification, least_margins};
 use onecycle_design::bands::{StepBands, load_bands, step_bands};
-use onecycle_design::loop_response;
+use onecycle_design::{assess_and_simulate, loop_response};
 use serde_json::{Value, json};
 
 use crate::words::limits::broken;
@@ -36,7 +33,8 @@ pub(crate) struct ByHand<'a> {
 /// each row of `load_band` the ends for the output, at the times of the rows.
 pub(crate) fn judged(of: &ByHand<'_>) -> Value {
     let (model, controller) = (of.model, of.controller);
-    let figures = assess(model, controller, of.asked.noise.as_ref());
+    let found = assess_and_simulate(model, controller, of.asked.noise.as_ref());
+    let (figures, responses) = found.unzip();
     let least = least_margins(of.draws, controller).map(|least| Least::from(&least));
     let mut answer = json!({
         "is_stable": figures.is_some(),
@@ -44,7 +42,7 @@ pub(crate) fn judged(of: &ByHand<'_>) -> Value {
         "least": least,
         "asks": broken(of.asked, figures.as_ref()).map(|question| sentence(&question)),
     });
-    let Some(figures) = figures else {
+    let (Some(figures), Some((step, load))) = (figures, responses) else {
         return answer;
     };
     let settled_s = figures.step.map(|step| 1.4 * step.settling_time_s);
@@ -53,12 +51,12 @@ pub(crate) fn judged(of: &ByHand<'_>) -> Value {
         .map(|k| end_s.unwrap_or(1.0) * f64::from(k) / f64::from(TIMES))
         .collect();
     answer["end_s"] = json!(end_s);
-    answer["step"] = json!(step_response(model, controller).ok().map(|response| {
+    answer["step"] = json!(step.map(|response| {
         let at = |&t_s: &f64| (t_s, response.at(t_s));
         let rows = times_s.iter().map(at).map(|(t_s, (y, u))| [t_s, y, u]);
         rows.collect::<Vec<_>>()
     }));
-    answer["load"] = json!(load_response(model, controller).ok().map(|response| {
+    answer["load"] = json!(load.map(|response| {
         let rows = times_s.iter().map(|&t_s| [t_s, response.at(t_s).0]);
         rows.collect::<Vec<_>>()
     }));

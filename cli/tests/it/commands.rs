@@ -308,7 +308,7 @@ fn the_json_report_has_every_key() {
             continue;
         }
         let range = &report["process"][name];
-        assert_eq!(keys(range), ["estimate", "high", "low"], "{name}");
+        assert_eq!(keys(range), ["estimate", "high", "low", "symbol"], "{name}");
         let [low, estimate, high] = ["low", "estimate", "high"].map(|side| range[side].as_f64());
         assert!(
             low <= estimate && estimate <= high && low.is_some(),

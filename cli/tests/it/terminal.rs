@@ -100,18 +100,25 @@ fn data_have_no_colours() {
 
 // ---------------------------------------------------------------- a terminal
 
-/// Output of `onecycle identify FILE` on a terminal of this width; `None` if the program `script` is not installed.
-fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<String> {
+/// Output of `onecycle identify` on a terminal of this width, in the folder of the file, whose name stands first in `arguments`;
+/// `None` if the program `script` is not installed.
+fn on_a_terminal(
+    folder: &Path,
+    arguments: &str,
+    columns: usize,
+    variable: Option<&str>,
+) -> Option<String> {
     let script = program("script")?;
     // Without the progress indicator.
     let program = env!("CARGO_BIN_EXE_onecycle");
-    let call = format!("stty rows 40 cols {columns}; '{program}' identify '{file}' 2>/dev/null");
+    let call = format!("stty rows 40 cols {columns}; '{program}' identify {arguments} 2>/dev/null");
     let mut command = Command::new(script);
     for other in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
         command.env_remove(other);
     }
     let output = command
         .args(["-qec", &call, "/dev/null"])
+        .current_dir(folder)
         .env("TERM", "xterm-256color")
         .envs(variable.map(|variable| (variable, "1")))
         .stdin(Stdio::null())
@@ -120,30 +127,43 @@ fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<S
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-// The card is as wide as the terminal, from 60 to 100 columns, and has its colours where the terminal has some.
+// The card is as wide as the terminal, from 60 to 100 columns, and has its colours where the terminal has some: of a recording, of a
+// flight, and of one loop of it, whose gains have three columns.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_card_fits_its_terminal() {
     let folder = Scratch::new();
-    let [good, _] = recordings(&folder);
-    for (columns, widest) in [(60, 60), (80, 80), (200, 100)] {
-        let Some(text) = on_a_terminal(&good, columns, None) else {
-            return;
-        };
-        assert!(text.contains("\x1b[32mFIRST GAINS\x1b[0m: "), "{text}");
-        let text = stripped(&text);
-        let lines: Vec<&str> = text.lines().collect();
-        let longest = lines
-            .iter()
-            .map(|line| line.trim_end().chars().count())
-            .max();
-        assert!(
-            longest <= Some(widest) && longest > Some(widest - 20),
-            "{columns}: {text}"
-        );
-        assert!(lines.len() <= if columns < 80 { 30 } else { 24 }, "{text}");
+    recordings(&folder);
+    let here = folder.path("");
+    let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/logs");
+    let (loop_lines, flight_lines) = ([30, 24], [40, 40]);
+    for (folder, arguments, all_columns, lines) in [
+        (&here, "noisy.csv", &[60, 80, 120, 200][..], loop_lines),
+        (
+            &logs,
+            "ap_sysid_roll.bin --axis roll",
+            &[60, 80][..],
+            loop_lines,
+        ),
+        (&logs, "ap_sysid_roll.bin", &[60, 80][..], flight_lines),
+    ] {
+        for &columns in all_columns {
+            let Some(text) = on_a_terminal(folder, arguments, columns, None) else {
+                return;
+            };
+            assert!(text.contains("\x1b[32m"), "{text}");
+            let text = stripped(&text);
+            let all: Vec<&str> = text.lines().collect();
+            let longest = all.iter().map(|line| line.trim_end().chars().count()).max();
+            let widest = columns.min(100);
+            assert!(
+                longest <= Some(widest) && longest > Some(widest - 20),
+                "{columns}: {text}"
+            );
+            assert!(all.len() <= lines[usize::from(columns > 60)], "{text}");
+        }
     }
-    let text = on_a_terminal(&good, 200, Some("NO_COLOR")).unwrap();
+    let text = on_a_terminal(&here, "noisy.csv", 200, Some("NO_COLOR")).unwrap();
     assert!(!text.contains(ESCAPE), "{text}");
 }
 

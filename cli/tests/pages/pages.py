@@ -116,7 +116,7 @@ def first_screens(page):
     """Checks that the card and both responses are on the first screen of a desk and the first two of a phone, and that all
     else is folded."""
     before = page.viewport_size
-    for (width, height), screens in (((1440, 900), 1), ((390, 844), 2)):
+    for (width, height), screens in (((1440, 900), 1), ((1366, 657), 1), ((390, 844), 2)):
         page.set_viewport_size({"width": width, "height": height})
         ends = page.evaluate(
             "[...document.querySelectorAll('.beside table, .beside .plot')].filter((one) => one.clientWidth)"

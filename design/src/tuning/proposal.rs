@@ -1,11 +1,14 @@
 //! Controllers to choose from: one in each style, and the figures by which any controller is judged.
 
 use crate::bands::quantiles;
-use crate::closed_loop::{load_response, margins, noise_amplification, sensitivity, step_response};
+use crate::closed_loop::{
+    LoadResponse, load_response, margins, noise_amplification, sensitivity, step_response,
+};
 use crate::controller::{Controller, Form};
 use crate::model::{Model, Structure};
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::step_metrics::StepMetrics;
+use crate::soiptd_pd::step_response::StepResponse;
 
 use super::design_over;
 use super::named::DesignOver;
@@ -124,23 +127,37 @@ pub fn assess(
     controller: &Controller,
     noise: Option<&MeasurementNoise>,
 ) -> Option<Assessment> {
+    assess_and_simulate(model, controller, noise).map(|(figures, _)| figures)
+}
+
+/// Responses to unit steps of the reference and of the load; `None` if they are too slow to simulate.
+pub type Responses = (Option<StepResponse>, Option<LoadResponse>);
+
+/// As [`assess`], with the responses that the figures are of.
+#[must_use]
+pub fn assess_and_simulate(
+    model: &Model,
+    controller: &Controller,
+    noise: Option<&MeasurementNoise>,
+) -> Option<(Assessment, Responses)> {
     let peaks = sensitivity(model, controller)?;
     let load = load_response(model, controller).ok();
     let share = |noise: &MeasurementNoise| {
         let amplification = noise_amplification(model, controller, noise.sample_period_s)?;
         Some(amplification * noise.std / noise.input_amplitude)
     };
-    Some(Assessment {
-        margins: margins(model, controller)?,
+    let margins = margins(model, controller)?;
+    let step = step_response(model, controller).ok();
+    let figures = Assessment {
+        margins,
         ms: peaks.ms,
         mt: peaks.mt,
-        step: step_response(model, controller)
-            .ok()
-            .map(|step| step.metrics),
+        step: step.as_ref().map(|step| step.metrics),
         load_iae: load.as_ref().map(|load| load.iae),
         load_peak: load.as_ref().map(|load| load.peak),
         noise_share: noise.and_then(share),
-    })
+    };
+    Some((figures, (step, load)))
 }
 
 /// Margins of a controller over draws from a posterior, each at the bad end of its central 90 % interval. An unstable draw
