@@ -5,7 +5,8 @@ set -eu
 package="$1" program="$2" folder="$3"
 shift 3
 name="$(basename "$program" .exe)"
-scripts="$package/$(echo "$name" | tr - _).data/scripts"
+# Where maturin looks for what is installed beside the module.
+scripts="$package/$(sed -n 's/^module-name = "\(.*\)"$/\1/p' "$package/pyproject.toml").data/scripts"
 trap 'rm -rf "$package"/*.data' EXIT
 mkdir -p "$scripts"
 cp "$program" "$scripts/"

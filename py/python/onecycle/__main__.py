@@ -20,7 +20,7 @@ def program(name: str = "onecycle") -> Path:
             path = Path(str(file.locate())).resolve()
             if path.exists():
                 return path
-    raise OnecycleError(f"this package was built without the program {name}: install the wheel of a release, or one of py/wheel.sh")
+    raise OnecycleError(f"this package was built without the program {name}: install a wheel of a release or of py/wheel.sh")
 
 
 def main(name: str = "onecycle") -> int:
