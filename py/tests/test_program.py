@@ -63,12 +63,12 @@ EXPERIMENTS = [
      "--k-over-t-body=40 --t-prop=0.05 --t-body=inf --tau=0.015 --noise=1% --bias=30% --seed=7 --asymmetry=0.2 --second-amplitude=0.6 "
      "--disturbance=walk=5%,w1=3"),
     (onecycle.Model("double_integrator_lag", k_over_t_body=40.0, t_prop_s=0.05, tau_s=0.015),
-     {"excitation": "chirp", "band": (0.5, 10), "duration": 8, "loop": (0.5, 0.1), "inject": "setpoint", "gust": ("5%", 0.5), "bare": False},
+     {"excitation": "chirp", "band": (0.5, 10), "duration": 8, "loop": (0.5, 0.1), "inject": "setpoint", "gust": (0.05, 0.5), "bare": False},
      "--process=double_integrator_lag --k-over-t-body=40 --t-prop=0.05 --tau=0.015 --excitation=chirp --band=0.5,10 --duration=8 "
-     "--loop=0.5,0.1 --inject=setpoint --gust=5%,0.5"),
+     "--loop=0.5,0.1 --inject=setpoint --gust=0.05,0.5"),
     (onecycle.Model("resonant", k=1.5, natural_frequency_rad_per_s=6.0, zeta=0.2, tau_s=0.01),
-     {"excitation": "prbs", "pulse": 0.3, "duration": 9, "no_trim": True, "outliers": ("1%", 2.0), "drop_outs": 0.01, "jitter": "1%"},
-     "--process=resonant --k=1.5 --natural-frequency=6 --zeta=0.2 --tau=0.01 --excitation=prbs --pulse=0.3 --duration=9 --no-trim "
+     {"beta": -0.5, "duration": 9, "no_trim": True, "outliers": ("1%", 2.0), "drop_outs": 0.01, "jitter": "1%"},
+     "--process=resonant --k=1.5 --natural-frequency=6 --zeta=0.2 --tau=0.01 --beta=-0.5 --duration=9 --no-trim "
      "--outliers=1%,2 --drop-outs=0.01 --jitter=1%"),
 ]
 
@@ -76,7 +76,7 @@ EXPERIMENTS = [
 @pytest.mark.parametrize(("model", "options", "words"), EXPERIMENTS, ids=lambda of: getattr(of, "structure", ""))
 def test_experiments_are_those_of_the_program(model, options, words, program, tmp_path):
     (tmp_path / "x.csv").write_text(program("simulate", *words.split()))
-    ours, theirs = onecycle.experiment(model, **options), onecycle.read(tmp_path / "x.csv")
+    ours, theirs = onecycle.experiment(model, **options), onecycle.read(tmp_path / "x.csv", input="input", output="output")
     assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.u, theirs.u) and np.array_equal(ours.y, theirs.y)
     assert (ours.r is None) == ("loop" not in options) and len(ours) > 100
 

@@ -273,7 +273,7 @@ class Report(_Shown):
         import xarray
 
         of = self.recording
-        groups = {"posterior": self.to_xarray()} | {
+        groups: dict[str, Any] = {"posterior": self.to_xarray()} | {
             group: xarray.Dataset({key: ("time_s", values)}, {"time_s": of.t})
             for group, key, values in (("observed_data", "y", of.y), ("constant_data", "u", of.u))
         }
