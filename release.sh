@@ -2,7 +2,7 @@
 # Builds what is published, into dist/:
 #   studio.html                     the studio: one page, for any browser
 #   onecycle-VERSION-linux-MACHINE  the program with the studio inside, static where the musl target can be had
-#   onecycle-VERSION-*.whl          the Python package, for Python 3.10 and later (maturin from the registry)
+#   onecycle-VERSION-*.whl          the Python package with the program inside, for Python 3.10 and later (maturin from the registry)
 #   onecycle-c-VERSION-MACHINE.tar.gz  library and header for firmware and programs in C
 #   SHA256SUMS                      their checksums
 # Needs Rust, a C linker, Python 3.10 with venv and, unless all crates are there, the network. No arguments.
@@ -45,9 +45,11 @@ echo "== Python package"
 python3 -m venv "$target/release-venv"
 python=$target/release-venv/bin/python
 "$python" -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
-CARGO_TARGET_DIR=$target "$python" -m maturin build --release --locked --manifest-path py/Cargo.toml --out dist
+cp "$program" "$target/onecycle"
+CARGO_TARGET_DIR=$target PYTHON=$python py/wheel.sh py "$target/onecycle" dist --release --locked
 "$python" -m pip install --quiet --disable-pip-version-check --force-reinstall dist/*.whl
 (cd / && "$python" -c 'import onecycle; onecycle.Model("foptd", k=2.0, t_body_s=1.5, tau_s=0.3)')
+"$python" -m onecycle identify examples/simulated_hover.csv >/dev/null
 
 echo "== C library"
 cargo build --release --locked --manifest-path onboard/c/Cargo.toml --target-dir "$target"

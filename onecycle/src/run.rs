@@ -164,6 +164,12 @@ impl Request {
         let asked = of_log.as_ref().map_or(asked, |of_log| {
             of_log.specification(asked, self.requirements.controller.is_some())
         });
+        // Without controllers the paper's alone, which needs no search, judges whether the process is known well enough; of a log, what
+        // has chosen the part did.
+        let asked = match self.without_controllers && of_log.is_none() {
+            true => Specification::paper(),
+            false => asked,
+        };
         let structure =
             (of_log.as_ref()).and_then(|of_log| log_gains::structure(of_log.control_loop()));
         let mut identify = self.settings(asked).structure(self.structure.or(structure));

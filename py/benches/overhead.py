@@ -1,6 +1,8 @@
-"""What Python and Dask cost: `python py/benches/overhead.py`, with the package built with `pip install ./py ./research/py`."""
+"""What Python and Dask cost: `python py/benches/overhead.py`, with the package built with `pip install ./py ./research/py`. A word runs
+one part: `call`, `many`, `memory`, `dask`."""
 
 import os
+import resource
 import statistics
 import sys
 import time
@@ -17,14 +19,55 @@ ROOT = Path(__file__).parents[2]
 def of_identify():
     recording = onecycle.read(ROOT / "examples/simulated_hover.csv")
     onecycle.identify(recording)
-    beyond, took = [], []
+    beyond, took, reports = [], [], []
     for _ in range(30):
         begin = time.perf_counter()
         found = onecycle.identify(recording)
         beyond.append(time.perf_counter() - begin - found.took_s)
         took.append(found.took_s)
+        # Not freed while the clock runs.
+        reports.append(found)
     print(f"identify: {1e3 * statistics.median(took):.1f} ms in Rust, and {1e3 * statistics.median(beyond):.2f} ms "
           f"(at most {1e3 * max(beyond):.2f} ms) from Python to Rust and back")
+
+
+def simulated(cases):
+    """A campaign of relay tests, and its recordings."""
+    campaign = onecycle_lab.Campaign(str(ROOT / "experiments/refine_1pct.toml"), [f"--cases={cases}"])
+    return campaign, [onecycle.Recording(*campaign.recording(n)[0]) for n in range(cases)]
+
+
+def of_many(cases=1000):
+    """One thread each: what the campaign in Rust takes, and what Python takes for the same recordings."""
+    begin = time.perf_counter()
+    campaign, recordings = simulated(cases)
+    simulated_s = time.perf_counter() - begin
+    begin = time.perf_counter()
+    campaign.cases(0, cases)
+    in_rust_s = time.perf_counter() - begin
+    took_s = {}
+    for design in (False, True):
+        begin = time.perf_counter()
+        reports = onecycle.identify_many(recordings, n_jobs=1, cycles=2, style="paper", design=design)
+        took_s[design] = time.perf_counter() - begin
+    print(f"{cases} recordings: the campaign in Rust {in_rust_s:.1f} s, of which simulation is some {simulated_s:.1f} s; identify_many "
+          f"without controllers {took_s[False]:.1f} s, with all {took_s[True]:.1f} s ({sum(bool(of.model) for of in reports)} identified)")
+
+
+def of_memory(count=5000):
+    """Memory after the first identifications and after all (MB)."""
+    _, recordings = simulated(10)
+
+    def resident():
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * resource.getpagesize() / 1e6
+
+    for n in range(count):
+        found = onecycle.identify(recordings[n % 10], cycles=2, design=n % 5 == 0)
+        found.posterior, found.rows, found.remarks
+        if n == count // 10:
+            before = resident()
+    print(f"{count} identifications: {before:.0f} MB after a tenth of them, {resident():.0f} MB after all")
 
 
 def relay_campaign(cases):
@@ -36,20 +79,20 @@ def alone(cases):
     campaign = relay_campaign(cases)
     begin = time.perf_counter()
     lines = campaign.cases(0, cases)
-    return time.perf_counter() - begin, sum(map(len, lines)) / cases
+    return time.perf_counter() - begin, sum(len(case) for case, _ in lines) / cases
 
 
-def of_campaign(client, workers, shard, tasks):
-    """Seconds of the same cases on the cluster, and those that the workers computed."""
+def of_campaign(client, workers, cases):
+    """Seconds of these cases on the cluster, those that the workers computed, and the number of tasks."""
     recipe = ROOT / "experiments/relay.toml"
     # Once without measuring, so that every worker has loaded the package.
     onecycle.campaign(recipe, client=client, shard=1, cases=8 * workers)
     begin = time.perf_counter()
     with get_task_stream(client) as stream:
-        onecycle.campaign(recipe, client=client, shard=shard, cases=shard * tasks)
+        onecycle.campaign(recipe, client=client, cases=cases)
         took_s = time.perf_counter() - begin
-    spans = (span for task in stream.data for span in task["startstops"] if span["action"] == "compute")
-    return took_s, sum(span["stop"] - span["start"] for span in spans)
+    spans = [span for task in stream.data for span in task["startstops"] if span["action"] == "compute"]
+    return took_s, sum(span["stop"] - span["start"] for span in spans), len(spans)
 
 
 def of_scheduler(client):
@@ -60,21 +103,23 @@ def of_scheduler(client):
     return count / (time.perf_counter() - begin)
 
 
-def main():
-    of_identify()
-    took_s, _ = alone(500)
-    shard, tasks = max(1, round(500 / took_s)), 20
-    cases = shard * tasks
+def of_dask(cases=10_000):
     for workers in sorted({1, os.cpu_count() or 1}):
         took_s, size = alone(cases)
         with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
             with Client(cluster) as client:
-                on_cluster_s, computed_s = of_campaign(client, workers, shard, tasks)
+                on_cluster_s, computed_s, tasks = of_campaign(client, workers, cases)
                 tasks_a_second = of_scheduler(client)
-        print(f"{workers} worker(s): {cases} relay experiments in {tasks} tasks of {computed_s / tasks:.2f} s: "
+        print(f"{workers} worker(s): {cases} relay experiments in {tasks} tasks: "
               f"{on_cluster_s:.2f} s, of which the workers were idle {100 * (1 - computed_s / workers / on_cluster_s):.1f} %; "
               f"{took_s:.2f} s in one thread without Dask; {tasks_a_second:.0f} empty tasks a second; "
               f"{size:.0f} bytes an outcome", flush=True)
+
+
+def main():
+    parts = {"call": of_identify, "many": of_many, "memory": of_memory, "dask": of_dask}
+    for name in sys.argv[1:] or parts:
+        parts[name]()
 
 
 if __name__ == "__main__":

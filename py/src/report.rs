@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use numpy::{IntoPyArray, PyArray1};
+use numpy::{Complex64, IntoPyArray, PyArray1, PyReadonlyArray1};
 use onecycle::words::verdict::advice;
 use onecycle::{DesignReport, Identified, Interval, Report};
 use onecycle_cli::report::json::to_text;
@@ -118,6 +118,23 @@ impl Found {
             parameters.map(column).collect()
         };
         self.of_identified(all).unwrap_or_default()
+    }
+
+    /// Frequency responses (rad/s) of the draws that are processes, one after the other.
+    fn responses<'py>(
+        &self,
+        py: Python<'py>,
+        w: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+        let w = w.as_slice()?;
+        let models = self.of_identified(|identified| identified.posterior.models(usize::MAX));
+        let all = models.unwrap_or_default().into_iter().flat_map(|model| {
+            w.iter().map(move |&w| {
+                let value = model.frequency_response(w);
+                Complex64::new(value.re, value.im)
+            })
+        });
+        Ok(all.collect::<Vec<_>>().into_pyarray(py))
     }
 
     /// The fit row by row.

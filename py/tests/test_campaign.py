@@ -84,8 +84,8 @@ def test_same_bits_with_a_worker_killed_and_one_slow(recipe, tmp_path):
         again = onecycle.campaign(recipe, client=client, out=out, shard=2)
         assert again.to_json() == outcomes.to_json()
         assert lost.exists() and parts[0].stat().st_mtime_ns == kept
-        with pytest.raises(onecycle.OnecycleError, match="another"):
-            onecycle.campaign(recipe, client=client, out=out, shard=3)
+        with pytest.raises(onecycle.OnecycleError, match="another recipe"):
+            onecycle.campaign(recipe, client=client, out=out, shard=2, sigma=0.01)
 
 
 def test_numbers_are_columns(recipe, tmp_path, client):
@@ -112,12 +112,73 @@ def test_a_folder_is_one_table(measure, tmp_path, client):
     of_pandas = pandas.read_parquet(out).set_index("n").sort_index()
     of_polars = polars.read_parquet(out).sort("n")
     of_duckdb = duckdb.sql(f"select * from '{out}/*.parquet' order by n").df().set_index("n")
-    assert set(of_pandas.columns) == set(frame.columns) | {"case"}
+    assert set(of_pandas.columns) == set(frame.columns) | {"case", "truth"}
     for name in frame:
         values = [None if value != value else value for value in frame[name]]
         assert of_polars[name].to_list() == values, name
         assert [None if value != value else value for value in of_pandas[name].astype(object).fillna(np.nan)] == values, name
         assert [None if value != value else value for value in of_duckdb[name].astype(object).fillna(np.nan)] == values, name
+
+
+def test_a_finished_campaign_is_extended(recipe, tmp_path, client):
+    out = tmp_path / "out"
+    few = onecycle.campaign(recipe, client=client, out=out, shard=4, cases=6)
+    assert str(few) == program("campaign", recipe, "--cases=6")
+    kept = {path: path.stat().st_mtime_ns for path in out.iterdir()}
+    done = []
+    # Other tasks, and a number in the file instead of the option: the cases are the same.
+    more = onecycle.campaign(recipe, client=client, out=out, shard=5, progress=lambda *of: done.append(of))
+    assert done[-1] == (24, 24) and len(done) == 4 and done[0][0] > 6
+    assert more.to_json() == program("campaign", recipe, "--json") and str(more) == program("campaign", recipe)
+    assert all(path.stat().st_mtime_ns == before for path, before in kept.items())
+    assert sorted(pandas.read_parquet(out)["n"]) == list(range(24))
+    # Fewer again are there already.
+    assert str(onecycle.campaign(recipe, client=client, out=out, cases=6)) == str(few)
+    # Where the kind of a case depends on their number, nothing can be added.
+    (tmp_path / "unknown.toml").write_text(SMALL["relay"].replace("relay", "unknown"))
+    from onecycle_lab import Campaign
+
+    one, other = (Campaign(str(tmp_path / "unknown.toml"), [f"--cases={n}"]).settings() for n in (1, 2))
+    assert one != other
+
+
+def test_truth_is_beside_the_outcome(recipe, tmp_path, client):
+    outcomes = onecycle.campaign(recipe, client=client, out=tmp_path / "out", cases=3)
+    frame = pandas.read_parquet(tmp_path / "out").sort_values("n")
+    for n, truth in enumerate(outcomes.truths):
+        assert truth["structure"] == "soiptd" and 0 < truth["t_prop_s"] < truth["t_body_s"] and abs(truth["input_bias"]) <= 0.3
+        assert frame["truth.tau_s"].iloc[n] == truth["tau_s"] == outcomes.to_pandas()["truth.tau_s"][n]
+    assert len({truth["tau_s"] for truth in outcomes.truths}) == 3
+    recordings = onecycle.campaign(ROOT / "experiments/any_open.toml", client=client, cases=4)
+    assert {truth["signal"] for truth in recordings.truths} and all(truth["duration_s"] > 0 for truth in recordings.truths)
+
+
+def test_an_own_measure_is_a_function(recipe, tmp_path, client):
+    # A local function travels by value: the workers do not have this file.
+    def error(recording, truth):
+        found = onecycle.identify(recording, cycles=2, design=False)
+        return {"of_tau_s": found.params["tau_s"] - truth["tau_s"], "samples": len(recording)}
+
+    out = tmp_path / "out"
+    outcomes = onecycle.campaign(recipe, client=client, out=out, cases=4, measure=error)
+    assert len(outcomes.cases) == 4 and all(abs(case["of_tau_s"]) < 0.01 and case["samples"] > 1000 for case in outcomes.cases)
+    frame = pandas.read_parquet(out).sort_values("n")
+    assert frame["outcome.of_tau_s"].tolist() == [case["of_tau_s"] for case in outcomes.cases]
+    assert json.loads(outcomes.to_json()) == {"cases": outcomes.cases} and "of_tau_s" in str(outcomes)
+    # The recordings are those of the campaign, and a number alone is an outcome.
+    lengths = onecycle.campaign(recipe, client=client, cases=4, measure=lambda recording, truth: np.int64(len(recording)))
+    assert lengths.cases == [case["samples"] for case in outcomes.cases]
+    with pytest.raises(onecycle.OnecycleError, match="another recipe, option, measure"):
+        onecycle.campaign(recipe, client=client, out=out, cases=4)
+
+
+def test_tasks_are_some_seconds_of_work(tmp_path, client):
+    path, out = tmp_path / "campaign.toml", tmp_path / "out"
+    path.write_text(SMALL["relay"])
+    onecycle.campaign(path, client=client, out=out, cases=2000)
+    sizes = sorted(pyarrow.parquet.read_metadata(part).num_rows for part in out.iterdir())
+    # One case for each thread, and then groups.
+    assert sum(sizes) == 2000 and sizes[:4] == [1] * 4 and len(sizes) < 60 and sizes[-1] > 50
 
 
 def test_tasks_follow_the_workers_that_come(recipe):

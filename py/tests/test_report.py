@@ -93,6 +93,34 @@ def test_draws_for_arviz(found):
     assert table.loc["k", "mean"] == pytest.approx(found.posterior["k"].mean(), rel=1e-2)
 
 
+def test_all_of_it_for_arviz(found):
+    made = found.to_arviz()
+    assert np.array_equal(made.posterior["k"][0], found.posterior["k"])
+    assert np.array_equal(made.observed_data["y"], found.recording.y) and np.array_equal(made.constant_data["u"], found.recording.u)
+    assert np.array_equal(made.observed_data["time_s"], found.recording.t)
+
+
+def test_a_frequency_response_has_bands(found):
+    w = np.logspace(-1, 2, 40).reshape(4, 10)
+    bands = found.frequency_response(w)
+    assert np.array_equal(bands.response, found.model.frequency_response(w)) and bands.phase_low_rad.shape == w.shape
+    magnitude, phase_rad = np.abs(bands.response), np.angle(bands.response)
+    assert (bands.magnitude_low < magnitude).all() and (magnitude < bands.magnitude_high).all()
+    assert (bands.phase_low_rad < phase_rad).all() and (phase_rad < bands.phase_high_rad).all()
+    wider = found.frequency_response(w, 0.99)
+    assert (wider.magnitude_low < bands.magnitude_low).all() and (wider.phase_high_rad > bands.phase_high_rad).all()
+    # The draws of the table make the same band; a few of them are the nearest process to one that is none.
+    draws = [onecycle.Model("soiptd", **{key: values[n] for key, values in found.posterior.items() if key not in ("k", "input_bias")})
+             for n in range(4000)]
+    gains = np.abs([model.frequency_response(3.0) for model in draws])
+    np.testing.assert_allclose(np.quantile(gains, [0.05, 0.95]),
+                               [found.frequency_response(3.0).magnitude_low[0], found.frequency_response(3.0).magnitude_high[0]], rtol=2e-3)
+    with pytest.raises(onecycle.OnecycleError, match="there is no process"):
+        onecycle.identify(CALM).frequency_response(w)
+    with pytest.raises(ValueError, match="level is 90"):
+        found.frequency_response(w, 90)
+
+
 def test_rows_are_those_of_the_program(found, program):
     import json
 

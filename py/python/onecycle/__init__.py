@@ -13,12 +13,12 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from . import _onecycle
+from . import _model, _onecycle
 from ._model import Controller, Margins, Model, margins, simulate, step
 from ._onecycle import OnecycleError, __version__
-from ._options import DesignOptions, FlightOptions, IdentifyOptions, ReadOptions, keywords, settings
+from ._options import DesignOptions, ExperimentOptions, FlightOptions, IdentifyOptions, ReadOptions, keywords, settings
 from ._recording import Recording
-from ._report import Answer, Design, Flight, Gain, Interval, Report, bare
+from ._report import Answer, Bands, Design, Flight, Gain, Interval, Report, bare
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     Source = Recording | str | os.PathLike[str]
 
 __all__ = [
-    "Answer", "Controller", "Design", "Flight", "Gain", "Interval", "Margins", "Model", "OnecycleError", "Recording", "Report",
-    "__version__", "campaign", "dataset", "design", "identify", "identify_flight", "identify_many", "margins", "read", "simulate", "step",
+    "Answer", "Bands", "Controller", "Design", "Flight", "Gain", "Interval", "Margins", "Model", "OnecycleError", "Recording", "Report",
+    "__version__", "campaign", "dataset", "design", "experiment", "identify", "identify_flight", "identify_many", "margins", "read", "simulate", "step",
 ]
 
 
@@ -78,24 +78,37 @@ def design(model: Model, **options: Unpack[DesignOptions]) -> Design:
     return Design("design", model, settings("design", DesignOptions, options))
 
 
+@keywords(ExperimentOptions)
+def experiment(model: Model, **options: Unpack[ExperimentOptions]) -> Recording:
+    """Simulates a test of a process exactly, with the relay of the firmware or any other signal, in an open or a closed loop:
+    `experiment(model, noise="1%", bias="30%", seed=7)`. It is `onecycle simulate`; OnecycleError if a keyword is out of its range, or the
+    package was built without the program."""
+    return _model.experiment(model, options)
+
+
 def campaign(
     recipe: str | os.PathLike[str],
     client: Any = None,
     out: str | os.PathLike[str] | None = None,
-    shard: int = 64,
+    shard: int | None = None,
     progress: Callable[[int, int], object] | None = None,
+    measure: Callable[[Recording, dict[str, Any]], Any] | None = None,
     **options: Any,
 ) -> Outcomes:
     """Runs a campaign (a TOML file) on Dask and returns its outcomes.
 
-    `client` is a `distributed.Client`; without one, workers are started on this machine. A task is `shard` cases. In the
-    folder `out` every shard leaves a Parquet file, and finished shards found there are not computed again.
-    `progress(done, count)` is called after each shard. Options are those of `onecycle-lab campaign`: `cases=1000`.
+    `client` is a `distributed.Client`; without one, workers are started on this machine. A task is `shard` cases, or some seconds
+    of work. In the folder `out` every task leaves a Parquet file, and cases found there are not computed again: the same call
+    resumes, one with more `cases` extends. `progress(done, count)` is called after each task. Options are those of
+    `onecycle-lab campaign`: `cases=1000`.
+
+    `measure(recording, truth)` is called for every case instead of the measure of the file, and returns its outcome: a number or a
+    dict of numbers, truth values and texts. `truth` has the structure and the parameters of the process.
     """
     from ._cluster import run
 
     words = [f"--{name.replace('_', '-')}={value}" for name, value in options.items() if value is not None]
-    return run(recipe, client, out, shard, progress, tuple(words))
+    return run(recipe, client, out, shard, progress, tuple(words), measure)
 
 
 def dataset(

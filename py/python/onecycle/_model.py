@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import tempfile
 from dataclasses import dataclass
 from math import comb, factorial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _onecycle
 from ._onecycle import OnecycleError
-from ._recording import _column
+from ._options import ExperimentOptions, settings
+from ._recording import Recording, _column
 
 if TYPE_CHECKING:
     import control
@@ -225,6 +230,29 @@ def step(model: Model, controller: Controller) -> tuple[NDArray[np.float64], NDA
     """Time (s), output and input of the loop after a unit step of the reference. OnecycleError if the loop is unstable."""
     t, y, u = model._inner.step(controller)
     return t, y, u
+
+
+def experiment(model: Model, options: ExperimentOptions) -> Recording:
+    from .__main__ import program
+
+    keys = model.parameters
+    if "k" in keys:
+        # Of both gains the one that is finite.
+        keys.pop("k" if np.isinf(keys["k"]) else "k_over_t_body", None)
+    words = [f"--process={model.structure}"]
+    for key, value in keys.items():
+        # The option is the key without its unit: `t_prop_s` is `--t-prop`.
+        words.append(f"--{re.sub('(_rad_per)?_s$', '', key).replace('_', '-')}={value!r}")
+    for name, text in settings("experiment", ExperimentOptions, options):
+        option = f"--{name.replace('_', '-')}"
+        words += {"true": [option], "false": []}.get(text, [f"{option}={text}"])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "experiment.csv")
+        run = subprocess.run([program(), "simulate", *words, "--out", path], capture_output=True, text=True)
+        if run.returncode != 0:
+            sentence = run.stderr.strip().removeprefix("error: ").removeprefix("onecycle: ").split("\n\n")[0]
+            raise _refused(re.sub(r"--([a-z][a-z0-9-]*)", lambda found: f"`{found[1].replace('-', '_')}`", sentence))
+        return Recording._of("experiment", _onecycle.read(path, [("input", "input"), ("output", "output")]))
 
 
 def simulate(model: Model, u: ArrayLike, sample_s: float) -> NDArray[np.float64]:

@@ -146,6 +146,64 @@ class IdentifyOptions(TableOptions, FlightOptions, total=False):
     """False leaves out the controllers to choose from."""
 
 
+class ExperimentOptions(TypedDict, total=False):
+    """The keywords of `experiment`. A size is a number in its unit, or a text such as "5%": of the test's amplitude at the input, of the
+    noise-free amplitude at the output."""
+
+    excitation: Literal["relay", "step", "doublet", "3-2-1-1", "prbs", "chirp", "multisine"]
+    """Test signal; else a relay."""
+    amplitude: float
+    """Its amplitude (input unit; output unit at the set-point); else 1."""
+    second_amplitude: float
+    """Amplitude of the relay in the second half of the test."""
+    pulse: float
+    """Half of a doublet, unit of 3-2-1-1, bit of a PRBS (s)."""
+    band: tuple[float, float]
+    """Lowest and highest frequency of a chirp or a multisine (Hz)."""
+    sines: int
+    """Number of sines of a multisine, 2 to 1000; else 12."""
+    loop: tuple[float, float] | tuple[float, float, float]
+    """Closes the loop with a PD controller: kp, kd and the time of its filter (s)."""
+    inject: Literal["input", "setpoint"]
+    """Where the test signal enters the closed loop; else at the input."""
+    beta: float
+    """Switching ratio of the relay, between -1 and 1."""
+    no_trim: bool
+    """Keep the centre of the relay fixed."""
+    asymmetry: Share
+    """Difference of high and low time that the trim leaves, as a share of the cycle, 0 to 0.5."""
+    bare: bool
+    """Plain relay, without smoothing and minimum switching time."""
+    preroll: float
+    """Time before the test signal (s); else 0.1."""
+    bias: Share
+    """Constant input disturbance, not recorded (input unit)."""
+    gust: tuple[Share, float]
+    """Gusts at the input: standard deviation (input unit) and correlation time (s)."""
+    disturbance: Mapping[Literal["walk", "white", "output-walk", "w1", "w0", "wy"], Share]
+    """Further disturbances, each by its strength: `onecycle simulate --help`."""
+    noise: Share
+    """Standard deviation of the measurement noise (output unit)."""
+    quantum: Share
+    """Resolution of the sensor (output unit)."""
+    outliers: Share | tuple[Share, Share]
+    """Share of the samples with an outlier, and its size (output unit)."""
+    drop_outs: Share
+    """Share of the samples that the sensor drops."""
+    jitter: Share
+    """Standard deviation of the sample period (s, or a share of it as text)."""
+    offset: Share
+    """Initial output (output unit)."""
+    reference: float
+    """Reference of the output (output unit)."""
+    sample_rate: float
+    """Sample rate (Hz); else 1000."""
+    duration: float
+    """Duration (s)."""
+    seed: int
+    """Seed of noise, disturbances and jitter; else 0."""
+
+
 def _text(name: str, value: Any) -> str:
     """A value as the settings of the library have it."""
     if getattr(value, "ndim", None) == 0:
@@ -155,6 +213,8 @@ def _text(name: str, value: Any) -> str:
         return os.fspath(value)
     if hasattr(value, "kp"):
         value = (value.kp, value.ki, value.kd, value.filter_s)
+    if isinstance(value, Mapping):
+        return ",".join(f"{key}={_text(name, one)}" for key, one in value.items())
     if isinstance(value, Iterable):
         between = ".." if name.endswith("_range") else ","
         return between.join(_text(name, one) for one in value)

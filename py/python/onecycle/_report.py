@@ -14,6 +14,7 @@ import numpy as np
 
 from . import _onecycle
 from ._model import Controller, Model
+from ._onecycle import OnecycleError
 from ._recording import Recording
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     import matplotlib.axes
     import pandas
     import xarray
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Arrays = Mapping[str, NDArray[np.float64]]
 
@@ -73,6 +74,11 @@ class _Shown:
     @cached_property
     def _card(self) -> str:
         return str(self._inner.text(False))
+
+    @cached_property
+    def _dict(self) -> dict[str, Any]:
+        """Read once, for what is looked up in it."""
+        return self.to_dict()
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON report of the program as a new dict: docs/identify-json.md. Its sentences name settings in backticks."""
@@ -150,6 +156,26 @@ class Interval:
     high: float | None
 
 
+@dataclass(frozen=True)
+class Bands:
+    """A frequency response with pointwise bands; arrays over `w`."""
+
+    w: NDArray[np.float64]
+    """Frequency (rad/s)."""
+    response: NDArray[np.complex128]
+    """Complex gain of the process."""
+    magnitude_low: NDArray[np.float64]
+    magnitude_high: NDArray[np.float64]
+    phase_low_rad: NDArray[np.float64]
+    """On the turn of `numpy.angle(response)`."""
+    phase_high_rad: NDArray[np.float64]
+
+
+def _check_level(level: float) -> None:
+    if not 0.0 < level < 1.0:
+        raise ValueError(f"level is {level}: give a number between 0 and 1, such as 0.9")
+
+
 class Report(_Shown):
     """What a recording says about its process. `print(report)` shows the answer, `report.summary()` all else."""
 
@@ -211,8 +237,7 @@ class Report(_Shown):
     def conf_int(self, level: float = 0.9) -> pandas.DataFrame | dict[str, tuple[float, float]]:
         """Ends of the central interval of every parameter: a DataFrame with the columns `low` and `high` if pandas is installed, else
         a dict of pairs. Of 90 % they are those of the report; of other levels quantiles of the draws, not inside (or outside) of them."""
-        if not 0.0 < level < 1.0:
-            raise ValueError(f"level is {level}: give a number between 0 and 1, such as 0.9")
+        _check_level(level)
         found = {key: self._ends(key, of, level) for key, of in self.intervals.items()}
         try:
             import pandas
@@ -241,6 +266,34 @@ class Report(_Shown):
 
         return xarray.Dataset({key: (("chain", "draw"), values[np.newaxis]) for key, values in self.posterior.items()})
 
+    def to_arviz(self) -> Any:
+        """The draws and the recording for arviz, in the groups `posterior`, `observed_data` and `constant_data`: its InferenceData, or
+        from arviz 1 on a DataTree."""
+        import arviz
+        import xarray
+
+        of = self.recording
+        groups: dict[str, Any] = {"posterior": self.to_xarray()} | {
+            group: xarray.Dataset({key: ("time_s", values)}, {"time_s": of.t})
+            for group, key, values in (("observed_data", "y", of.y), ("constant_data", "u", of.u))
+        }
+        return arviz.InferenceData(**groups) if hasattr(arviz, "InferenceData") else xarray.DataTree.from_dict(groups)
+
+    def frequency_response(self, w: ArrayLike, level: float = 0.9) -> Bands:
+        """Frequency response of the process at the frequencies `w` (rad/s), with the bands of the posterior at this level. OnecycleError
+        if the process was refused."""
+        _check_level(level)
+        if self.model is None:
+            raise OnecycleError(f"there is no process: {self.refusal}")
+        at = np.atleast_1d(np.asarray(w, dtype=np.float64))
+        response = self.model.frequency_response(at)
+        draws = self._inner.responses(np.ascontiguousarray(at.reshape(-1))).reshape(-1, *at.shape)
+        ends = [0.5 - 0.5 * level, 0.5 + 0.5 * level]
+        phase_rad = np.angle(response)
+        # The phase of a draw beside that of the model: no turn lies between them.
+        return Bands(at, response, *np.quantile(np.abs(draws), ends, axis=0),
+                     *(phase_rad + np.quantile(np.angle(draws / response), ends, axis=0)))
+
     @cached_property
     def rows(self) -> Arrays:
         """The fit row by row, as arrays of equal length: `time_s`, `measured` (NaN where absent), `simulated` (without disturbances),
@@ -267,18 +320,17 @@ class Report(_Shown):
     @property
     def verdict(self) -> dict[str, str | None]:
         """`kind`, `message` and `advice` of the JSON report."""
-        made: dict[str, str | None] = self.to_dict()["verdict"]
-        return made
+        return dict(self._dict["verdict"])
 
     @property
     def remarks(self) -> list[str]:
         """Reasons to suspect the result, in sentences; their fixed names are `to_dict()["remark_kinds"]`."""
-        return list(self.to_dict()["remarks"])
+        return list(self._dict["remarks"])
 
     @property
     def details(self) -> list[str]:
         """All other remarks, in sentences: how the result was found, what no such test shows, what the controller asks for."""
-        return list(self.to_dict()["details"])
+        return list(self._dict["details"])
 
     @cached_property
     def took_s(self) -> float:

@@ -15,13 +15,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="python -m onecycle.campaign",
         description="Runs a campaign, or with --examples a training set, on Dask workers. The same command resumes an "
-        "interrupted run.",
+        "interrupted run, one with more --cases extends it.",
         epilog="Options that are not listed are those of `onecycle-lab campaign`, such as --cases=1000.",
     )
     parser.add_argument("file", help="file of the campaign, or recipe of the training set (TOML)")
     parser.add_argument("--scheduler", help="address of a Dask scheduler (default: workers on this machine)")
     parser.add_argument("--out", required=True, help="folder of the results")
-    parser.add_argument("--shard", type=int, default=64, help="cases of a task (default 64)")
+    parser.add_argument("--shard", type=int, help="cases of a task (default: some seconds of work)")
     parser.add_argument("--examples", type=int, help="makes a training set of this number of experiments")
     parser.add_argument("--json", action="store_true", help="print the outcome of every case instead of the table")
     arguments, options = parser.parse_known_args()

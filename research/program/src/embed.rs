@@ -5,6 +5,7 @@
 use onecycle_cli::args;
 use onecycle_cli::failure::Failure;
 use onecycle_cli::style::plain;
+pub use onecycle_lab::experiments::honesty::Columns;
 use onecycle_lab::learn::dataset::shards::{Entry, Manifest};
 use onecycle_lab::workers::OneThread;
 use serde_json::Value;
@@ -18,8 +19,9 @@ use crate::commands::dataset::folder::Folder;
 /// order.
 pub struct Campaign {
     plan: Box<dyn plan::Shared>,
-    /// Those of the JSON report. `None`: the table is asked for.
-    settings: Option<Value>,
+    settings: Value,
+    /// Whether the JSON report is asked for instead of the table.
+    is_json: bool,
 }
 
 impl Campaign {
@@ -32,12 +34,25 @@ impl Campaign {
             return Err("not the command campaign".to_owned());
         };
         let read = || {
-            let plan = plan::of(&arguments)?;
-            let settings = arguments.json.then(|| campaign::settings(&arguments));
-            Ok((plan, settings.transpose()?))
+            Ok(Self {
+                plan: plan::of(&arguments)?,
+                settings: campaign::settings(&arguments)?,
+                is_json: arguments.json,
+            })
         };
-        let (plan, settings) = read().map_err(|failure: Failure| failure.to_string())?;
-        Ok(Self { plan, settings })
+        read().map_err(|failure: Failure| failure.to_string())
+    }
+
+    /// All that decides the outcome of a case, as JSON. The number of cases is among it only where the kind of a case depends on it:
+    /// any other campaign can be extended.
+    #[must_use]
+    pub fn settings(&self) -> String {
+        let mut settings = self.settings.clone();
+        if self.plan.is_extensible() {
+            settings["cases"] = Value::Null;
+            settings["file"]["cases"] = Value::Null;
+        }
+        settings.to_string()
     }
 
     /// Number of cases.
@@ -46,15 +61,30 @@ impl Campaign {
         self.plan.count()
     }
 
-    /// The outcome of case `n`, as JSON on one line.
+    /// The outcome of case `n` and its truth, each as JSON on one line.
     ///
     /// # Errors
     /// One sentence: there is no such case, or it cannot be simulated.
-    pub fn case(&self, n: u64) -> Result<String, String> {
-        if n >= self.count() {
-            return Err(format!("there is no case {n}: there are {}", self.count()));
-        }
+    pub fn case(&self, n: u64) -> Result<[String; 2], String> {
+        self.check(n)?;
         self.plan.line(n).map_err(|failure| failure.to_string())
+    }
+
+    /// The recording of case `n`, which it is judged by, and its truth as JSON on one line.
+    ///
+    /// # Errors
+    /// As [`case`](Self::case).
+    pub fn recording(&self, n: u64) -> Result<(Columns, String), String> {
+        self.check(n)?;
+        let recording = self.plan.recording(n);
+        recording.map_err(|failure| failure.to_string())
+    }
+
+    fn check(&self, n: u64) -> Result<(), String> {
+        match n < self.count() {
+            true => Ok(()),
+            false => Err(format!("there is no case {n}: there are {}", self.count())),
+        }
     }
 
     /// What `onecycle-lab campaign` prints for the outcomes of all cases, in the order of their numbers: with the option
@@ -70,7 +100,8 @@ impl Campaign {
                 self.count()
             ));
         }
-        let text = self.plan.text(self.settings.as_ref(), cases);
+        let settings = self.is_json.then_some(&self.settings);
+        let text = self.plan.text(settings, cases);
         text.map(|text| plain(&text))
             .map_err(|failure| failure.to_string())
     }

@@ -9,11 +9,14 @@ mod waited;
 
 use std::sync::Arc;
 
+use numpy::{IntoPyArray, PyArray1};
 use onecycle_lab_cli::embed as lab;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 
 use crate::waited::waited;
+
+type Columns<'py> = [Bound<'py, PyArray1<f64>>; 3];
 
 /// The error of the package `onecycle`.
 fn refused(sentence: String) -> PyErr {
@@ -44,12 +47,26 @@ impl Campaign {
         self.0.count() as usize
     }
 
-    /// Outcomes of the cases from `first` to before `end`, each as JSON on one line.
-    fn cases(&self, py: Python<'_>, first: u64, end: u64) -> PyResult<Vec<String>> {
+    /// All that decides the outcome of a case, as JSON.
+    fn settings(&self) -> String {
+        self.0.settings()
+    }
+
+    /// Outcomes and truths of the cases from `first` to before `end`, each as JSON on one line.
+    fn cases(&self, py: Python<'_>, first: u64, end: u64) -> PyResult<Vec<[String; 2]>> {
         let campaign = Arc::clone(&self.0);
         let work = move || (first..end).map(|n| campaign.case(n)).collect();
-        let cases: Result<Vec<String>, String> = waited(py, work)?;
+        let cases: Result<Vec<[String; 2]>, String> = waited(py, work)?;
         cases.map_err(refused)
+    }
+
+    /// Time (s), input and output of case `n`, and its truth as JSON on one line.
+    fn recording<'py>(&self, py: Python<'py>, n: u64) -> PyResult<(Columns<'py>, String)> {
+        let campaign = Arc::clone(&self.0);
+        let made = waited(py, move || campaign.recording(n))?;
+        let (of, truth) = made.map_err(refused)?;
+        let columns = [of.time_s, of.input, of.output];
+        Ok((columns.map(|values| values.into_pyarray(py)), truth))
     }
 
     /// What the program prints for the outcomes of all cases.

@@ -31,7 +31,7 @@ pub struct RelayOutcome {
 }
 
 /// Duration of a relay test, in periods of the describing function: twice what the slowest processes need.
-const RELAY_PERIODS: f64 = 40.0;
+pub const RELAY_PERIODS: f64 = 40.0;
 /// A relay that has not switched for this many periods has run away.
 const DEAD_PERIODS: f64 = 8.0;
 

@@ -2,17 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
+use onecycle::Model;
 use onecycle_cli::failure::Failure;
+use onecycle_lab::experiments::honesty::{Columns, FaultyRecording};
+use onecycle_lab::experiments::recording::SimulatedRecording;
 use onecycle_lab::experiments::{
-    Campaign, DefectKind, HonestyCampaign, Measure, Recipe, RecordingCampaign, RelayExperiment,
+    Campaign, DefectKind, HonestyCampaign, IDENTIFICATION_PERIODS, Measure, Recipe,
+    RecordingCampaign, RelayExperiment,
 };
 use onecycle_lab::judge::honesty::{HonestyOutcome, honesty_outcome};
-use onecycle_lab::judge::out_of_family::{CycleClassifier, evaluate};
-use onecycle_lab::judge::outcome::{identification_outcome, relay_outcome};
+use onecycle_lab::judge::out_of_family::{CycleClassifier, PERIODS, evaluate};
+use onecycle_lab::judge::outcome::{RELAY_PERIODS, identification_outcome, relay_outcome};
 use onecycle_lab::judge::recording::{RecordingOutcome, recording_outcome};
 use onecycle_onboard::classify::{Calibration, ClassifyError};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
+use onecycle_plant::Trace;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -30,8 +35,16 @@ trait Plan: Send + Sync {
     /// Number of cases.
     fn count(&self) -> u64;
 
-    /// Simulates and judges case `n`.
-    fn case(&self, n: u64) -> Result<Self::Case, Failure>;
+    /// Whether case `n` is the same for any number of cases.
+    fn is_extensible(&self) -> bool {
+        true
+    }
+
+    /// Simulates and judges case `n`: its outcome and its truth.
+    fn case(&self, n: u64) -> Result<(Self::Case, Value), Failure>;
+
+    /// Simulates case `n`: its recording and its truth.
+    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure>;
 
     /// The table of all cases.
     fn table(&self, cases: &[Self::Case]) -> String;
@@ -47,8 +60,14 @@ pub(crate) trait Shared: Send + Sync {
     /// Number of cases.
     fn count(&self) -> u64;
 
-    /// The outcome of case `n`, as JSON on one line.
-    fn line(&self, n: u64) -> Result<String, Failure>;
+    /// Whether case `n` is the same for any number of cases.
+    fn is_extensible(&self) -> bool;
+
+    /// The outcome of case `n` and its truth, each as JSON on one line.
+    fn line(&self, n: u64) -> Result<[String; 2], Failure>;
+
+    /// The recording of case `n`, and its truth as JSON on one line.
+    fn recording(&self, n: u64) -> Result<(Columns, String), Failure>;
 
     /// The table of these outcomes, which are in the order of their numbers; with the settings of the campaign, the JSON
     /// report.
@@ -63,9 +82,19 @@ impl<P: Plan> Shared for P {
         Plan::count(self)
     }
 
-    fn line(&self, n: u64) -> Result<String, Failure> {
-        let case = self.case(n)?;
-        serde_json::to_string(&case).map_err(Failure::usage)
+    fn is_extensible(&self) -> bool {
+        Plan::is_extensible(self)
+    }
+
+    fn line(&self, n: u64) -> Result<[String; 2], Failure> {
+        let (case, truth) = self.case(n)?;
+        let case = serde_json::to_string(&case).map_err(Failure::usage)?;
+        Ok([case, truth.to_string()])
+    }
+
+    fn recording(&self, n: u64) -> Result<(Columns, String), Failure> {
+        let (columns, truth) = Plan::recording(self, n)?;
+        Ok((columns, truth.to_string()))
     }
 
     fn text(&self, settings: Option<&Value>, lines: &[String]) -> Result<String, Failure> {
@@ -77,7 +106,9 @@ impl<P: Plan> Shared for P {
     fn run(&self, arguments: &args::Campaign) -> Result<Table, Failure> {
         let settings = super::settings(arguments)?;
         let shown = arguments.json.then_some(&settings);
-        let (cases, journal) = finished(arguments, &settings, Plan::count(self), |n| self.case(n))?;
+        let (cases, journal) = finished(arguments, &settings, Plan::count(self), |n| {
+            Ok(self.case(n)?.0)
+        })?;
         Ok((printed(self, shown, &cases), journal))
     }
 }
@@ -166,6 +197,38 @@ fn experiment(campaign: &Campaign, n: u64) -> Result<RelayExperiment, Failure> {
     campaign.experiment(n).map_err(Failure::usage)
 }
 
+/// The recording of a relay test of this many periods.
+fn recorded(experiment: &RelayExperiment, periods: f64) -> Result<Columns, Failure> {
+    let (trace, _) = experiment.run(periods).map_err(Failure::usage)?;
+    Ok(columns(trace, experiment.sample_s))
+}
+
+fn columns(trace: Trace, sample_s: f64) -> Columns {
+    Columns {
+        sample_s,
+        time_s: trace.time_s,
+        input: trace.input,
+        output: trace.output,
+    }
+}
+
+/// Structure and parameters of a process by their keys, and what else a case was made of.
+fn truth<const N: usize>(model: &Model, more: [(&str, Value); N]) -> Value {
+    let structure = model.structure();
+    let parameters = structure.parameters().iter();
+    let parameters = parameters.filter_map(|&of| Some((of.key(), json!(model.parameter(of)?))));
+    let named = [("structure", json!(structure.name()))].into_iter();
+    named.chain(parameters).chain(more).collect()
+}
+
+fn truth_of_relay_test(experiment: &RelayExperiment) -> Value {
+    let more = [
+        ("input_bias", json!(experiment.input_bias)),
+        ("noise_sigma", json!(experiment.noise_sigma)),
+    ];
+    truth(&Model::Soiptd(experiment.process), more)
+}
+
 /// The relay alone.
 struct Relay(Campaign);
 
@@ -176,9 +239,16 @@ impl Plan for Relay {
         self.0.cases
     }
 
-    fn case(&self, n: u64) -> Result<RelayCase, Failure> {
-        let outcome = relay_outcome(&experiment(&self.0, n)?);
-        outcome.map(RelayCase::from).map_err(Failure::usage)
+    fn case(&self, n: u64) -> Result<(RelayCase, Value), Failure> {
+        let experiment = experiment(&self.0, n)?;
+        let outcome = relay_outcome(&experiment).map_err(Failure::usage)?;
+        Ok((outcome.into(), truth_of_relay_test(&experiment)))
+    }
+
+    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+        let experiment = experiment(&self.0, n)?;
+        let columns = recorded(&experiment, RELAY_PERIODS)?;
+        Ok((columns, truth_of_relay_test(&experiment)))
     }
 
     fn table(&self, cases: &[RelayCase]) -> String {
@@ -196,10 +266,17 @@ impl Plan for Identification {
         self.0.cases
     }
 
-    fn case(&self, n: u64) -> Result<IdentificationCase, Failure> {
-        identification_outcome(&self.0, &experiment(&self.0, n)?)
-            .map(|outcome| IdentificationCase::of(&outcome))
-            .map_err(Failure::usage)
+    fn case(&self, n: u64) -> Result<(IdentificationCase, Value), Failure> {
+        let experiment = experiment(&self.0, n)?;
+        let outcome = identification_outcome(&self.0, &experiment).map_err(Failure::usage)?;
+        let case = IdentificationCase::of(&outcome);
+        Ok((case, truth_of_relay_test(&experiment)))
+    }
+
+    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+        let experiment = experiment(&self.0, n)?;
+        let columns = recorded(&experiment, IDENTIFICATION_PERIODS)?;
+        Ok((columns, truth_of_relay_test(&experiment)))
     }
 
     fn table(&self, cases: &[IdentificationCase]) -> String {
@@ -209,6 +286,10 @@ impl Plan for Identification {
 
 /// Cases of the family for one case of each kind out of it: false alarms are rare and count most.
 const IN_FAMILY: u64 = 5;
+
+fn without_recording(n: u64, reason: &str) -> Failure {
+    Failure::usage(format!("case {n} has no recording: its process {reason}"))
+}
 
 /// Processes in and out of the family.
 struct Unknown {
@@ -246,6 +327,16 @@ impl Unknown {
         }
     }
 
+    /// The experiment of case `n`, if the process oscillates, and its truth.
+    fn experiment(&self, n: u64) -> Result<(Option<RelayExperiment>, Value), Failure> {
+        let (kind, n) = self.kind(n);
+        let experiment = self.recipe.experiment_with_defect(kind, n);
+        let experiment = experiment.map_err(Failure::usage)?;
+        let mut truth = experiment.as_ref().map_or(json!({}), truth_of_relay_test);
+        truth["kind"] = json!(kind.name());
+        Ok((experiment, truth))
+    }
+
     /// The cases of each kind. Processes that do not oscillate even without their defect are left out.
     fn rows(&self, cases: &[Option<OutsiderCase>]) -> Vec<(DefectKind, Vec<OutsiderCase>)> {
         let numbered = || (0..).zip(cases);
@@ -265,7 +356,13 @@ impl Plan for Unknown {
         (IN_FAMILY + DefectKind::OUTSIDE.len() as u64) * self.campaign.cases
     }
 
-    fn case(&self, n: u64) -> Result<Option<OutsiderCase>, Failure> {
+    /// Those of a kind follow each other.
+    fn is_extensible(&self) -> bool {
+        false
+    }
+
+    fn case(&self, n: u64) -> Result<(Option<OutsiderCase>, Value), Failure> {
+        let (_, truth) = self.experiment(n)?;
         let network = |signature: &Signature| self.pack.outputs(&signature.values);
         let classifier = CycleClassifier {
             network: &network,
@@ -273,7 +370,13 @@ impl Plan for Unknown {
         };
         let (kind, n) = self.kind(n);
         let judged = evaluate(&self.recipe, kind, n, Some(&classifier)).map_err(Failure::usage)?;
-        Ok(judged.map(OutsiderCase::from))
+        Ok((judged.map(OutsiderCase::from), truth))
+    }
+
+    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+        let (experiment, truth) = self.experiment(n)?;
+        let experiment = experiment.ok_or_else(|| without_recording(n, "does not oscillate"))?;
+        Ok((recorded(&experiment, PERIODS)?, truth))
     }
 
     fn table(&self, cases: &[Option<OutsiderCase>]) -> String {
@@ -292,6 +395,24 @@ impl Plan for Unknown {
 /// Recordings of any kind, and the file that describes them.
 struct Recordings(RecordingCampaign, PathBuf);
 
+impl Recordings {
+    fn record(&self, n: u64) -> Result<(SimulatedRecording, Value), Failure> {
+        let recording = self.0.record(n);
+        let recording = recording.map_err(|error| Failure::unreadable(&self.1, error))?;
+        let at = self.0.combination(n);
+        let more = [
+            ("input_bias", json!(recording.input_bias)),
+            (
+                "signal",
+                json!(self.0.excitations[at.excitation].signal.name()),
+            ),
+            ("duration_s", json!(self.0.durations_s[at.duration])),
+        ];
+        let truth = truth(&recording.model, more);
+        Ok((recording, truth))
+    }
+}
+
 impl Plan for Recordings {
     type Case = RecordingOutcome;
 
@@ -299,10 +420,14 @@ impl Plan for Recordings {
         self.0.cases
     }
 
-    fn case(&self, n: u64) -> Result<RecordingOutcome, Failure> {
-        let recording = self.0.record(n);
-        let recording = recording.map_err(|error| Failure::unreadable(&self.1, error))?;
-        Ok(recording_outcome(&recording, &self.0.options()))
+    fn case(&self, n: u64) -> Result<(RecordingOutcome, Value), Failure> {
+        let (recording, truth) = self.record(n)?;
+        Ok((recording_outcome(&recording, &self.0.options()), truth))
+    }
+
+    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+        let (recording, truth) = self.record(n)?;
+        Ok((columns(recording.trace, recording.sample_s), truth))
     }
 
     fn table(&self, cases: &[RecordingOutcome]) -> String {
@@ -313,6 +438,26 @@ impl Plan for Recordings {
 /// Wrong data, and the file that describes them.
 struct WrongData(HonestyCampaign, PathBuf);
 
+impl WrongData {
+    /// The recording, unless its output runs away, and its truth.
+    fn record(&self, n: u64) -> Result<(Option<FaultyRecording>, Value), Failure> {
+        let (kind, n) = ((n / self.0.cases) as usize, n % self.0.cases);
+        let recording = self.0.record(kind, n);
+        let recording = recording.map_err(|error| Failure::unreadable(&self.1, error))?;
+        let of = |recording: &FaultyRecording| {
+            let more = [
+                ("input_bias", json!(recording.input_bias)),
+                ("noise_sigma", json!(recording.noise_sigma)),
+                ("strength", json!(recording.strength)),
+            ];
+            truth(&recording.truth.process.into(), more)
+        };
+        let mut truth = recording.as_ref().map_or(json!({}), of);
+        truth["kind"] = json!(self.0.kinds[kind].name);
+        Ok((recording, truth))
+    }
+}
+
 impl Plan for WrongData {
     type Case = HonestyOutcome;
 
@@ -320,11 +465,20 @@ impl Plan for WrongData {
         self.0.cases * self.0.kinds.len() as u64
     }
 
-    fn case(&self, n: u64) -> Result<HonestyOutcome, Failure> {
-        let (kind, n) = ((n / self.0.cases) as usize, n % self.0.cases);
-        let recording = self.0.record(kind, n);
-        let recording = recording.map_err(|error| Failure::unreadable(&self.1, error))?;
-        Ok(honesty_outcome(recording.as_ref()))
+    /// Those of a kind follow each other.
+    fn is_extensible(&self) -> bool {
+        false
+    }
+
+    fn case(&self, n: u64) -> Result<(HonestyOutcome, Value), Failure> {
+        let (recording, truth) = self.record(n)?;
+        Ok((honesty_outcome(recording.as_ref()), truth))
+    }
+
+    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+        let (recording, truth) = self.record(n)?;
+        let recording = recording.ok_or_else(|| without_recording(n, "runs away"))?;
+        Ok((recording.columns, truth))
     }
 
     fn table(&self, cases: &[HonestyOutcome]) -> String {
