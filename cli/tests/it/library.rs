@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use onecycle::{
-    CsvOptions, Excitation, Identification, Identify, Method, Pack, Parameter, Recording, Remark,
-    Specification, Verdict, with_signals,
+    CsvOptions, Excitation, Identification, Identified, Identify, Method, Pack, Parameter,
+    Recording, Remark, Specification, Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
@@ -31,6 +31,13 @@ fn interval(of: &onecycle::Interval) -> Value {
     json!({"estimate": of.estimate, "low": of.low, "high": of.high})
 }
 
+/// A parameter of the process as the report has it.
+fn process_value(identified: &Identified, parameter: Parameter, of: &onecycle::Interval) -> Value {
+    let mut value = interval(of);
+    value["symbol"] = json!(parameter.symbol_in(identified.model.structure()));
+    value
+}
+
 // The report's numbers are the shortest that read back to the same bits, so they are the library's numbers to
 // the bit; and each sentence is the same.
 #[test]
@@ -45,8 +52,7 @@ fn the_program_says_what_the_library_finds() {
         assert_eq!(identified.estimate.iter().count(), 6);
         for (parameter, ours) in identified.estimate.iter() {
             let key = parameter.key();
-            let mut known = interval(&ours);
-            known["symbol"] = json!(parameter.symbol_in(identified.model.structure()));
+            let known = process_value(identified, parameter, &ours);
             assert_eq!(report.0["process"][key], known, "{name}: {key}");
         }
         for (key, ours) in [
@@ -114,7 +120,8 @@ fn the_program_refuses_what_the_library_refuses() {
     let report = run(&identify_json).identified();
     for (parameter, ours) in identified.estimate.iter() {
         let key = parameter.key();
-        assert_eq!(report.0["process"][key], interval(&ours), "{key}");
+        let known = process_value(&identified, parameter, &ours);
+        assert_eq!(report.0["process"][key], known, "{key}");
     }
 }
 

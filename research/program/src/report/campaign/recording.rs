@@ -68,7 +68,42 @@ pub(crate) fn table(campaign: &RecordingCampaign, outcomes: &[RecordingOutcome])
     for block in blocks {
         parameter_rows(&mut text, &rows, block);
     }
+    summary(&mut text, &rows);
     text
+}
+
+/// The same in short, as docs/benchmarks has it. Writing to a string cannot fail.
+fn summary(text: &mut String, rows: &[(String, RecordingTally)]) {
+    const RATIOS: [Parameter; 3] = [Parameter::KOverTBody, Parameter::TProp, Parameter::Tau];
+    let Some((_, all)) = rows.first() else {
+        return;
+    };
+    let estimated = |parameter: &Parameter| all.parameters.contains_key(parameter.key());
+    let columns: Vec<Parameter> = PARAMETERS.into_iter().filter(estimated).collect();
+    let symbols: Vec<&str> = columns.iter().map(|of| of.symbol()).collect();
+    let ratios = RATIOS.map(|parameter| parameter.symbol()).join(", ");
+    let _ = writeln!(
+        text,
+        "\n| | refused | {} | rms error over posterior: {ratios} | over Cramer-Rao bound |\n|{}",
+        symbols.join(" | "),
+        " --- |".repeat(columns.len() + 4)
+    );
+    for (name, tally) in rows {
+        let figure = |parameter: &Parameter, figure: Figure, scale, decimals| {
+            let value = tally.parameters.get(parameter.key()).and_then(figure);
+            or_dash(value.map(|value| scale * value), decimals)
+        };
+        let held = (columns.iter()).map(|of| figure(of, ParameterTally::coverage, 100.0, 0));
+        let ratios = [ParameterTally::rms, ParameterTally::rms_over_bound]
+            .map(|rms| RATIOS.map(|of| figure(&of, rms, 1.0, 2)).join(", "));
+        let _ = writeln!(
+            text,
+            "| {name} | {:.1} % | {} | {} |",
+            100.0 * tally.refusals() as f64 / tally.cases as f64,
+            held.collect::<Vec<_>>().join(" | "),
+            ratios.join(" | ")
+        );
+    }
 }
 
 /// A figure of a parameter.
