@@ -1,6 +1,6 @@
 //! `simulate` with processes, test signals, loops and disturbances beyond the relay test of `commands`.
 
-use crate::common::{Scratch, run, simulate};
+use crate::common::{Scratch, identify, run, simulate};
 
 const TANK: [&str; 8] = [
     "--process",
@@ -226,7 +226,7 @@ fn a_loop_has_a_setpoint() {
         "1",
     ];
     let inside = Simulated::of(&ROLL, &chirp);
-    assert_eq!(inside.names, "time_s,output,input,setpoint");
+    assert_eq!(inside.names, "time_s,process_output,process_input,setpoint");
     assert!(inside.column(3).iter().all(|setpoint| *setpoint == 1.0));
     assert_eq!(inside.truth("filter_s"), 0.1 * 0.1 / 0.5);
     let at_setpoint = Simulated::of(&ROLL, &[&chirp[..], &["--inject", "setpoint"]].concat());
@@ -244,6 +244,34 @@ fn a_loop_has_a_setpoint() {
     }
     // Without a test signal at the input, u = KP (r - y) at the first sample, where the derivative is zero.
     assert_eq!(inside.rows[0][2], 0.0);
+}
+
+// `input` and `output` beside a set-point may be those of a controller: the file says that they are the process's.
+#[test]
+fn a_closed_loop_is_identified_from_its_own_file() {
+    let process = [
+        "--k", "1", "--t-body", "2", "--t-prop", "0.2", "--tau", "0.1",
+    ];
+    let test = [
+        "--excitation",
+        "prbs",
+        "--pulse",
+        "1",
+        "--amplitude",
+        "0.2",
+        "--duration",
+        "60",
+        "--sample-rate",
+        "50",
+        "--loop",
+        "0.5,0.1",
+        "--inject",
+        "setpoint",
+    ];
+    let report = identify(simulate(&process, &test), &[]).identified();
+    assert_eq!(report.0["columns"]["input"]["name"], "process_input");
+    let gain = report.0["process"]["k"]["estimate"].as_f64().unwrap();
+    assert!((gain - 1.0).abs() < 0.05, "{gain}");
 }
 
 // A relay beside a controller, on a process without integrator.

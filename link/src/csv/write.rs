@@ -6,8 +6,11 @@ use crate::recording::Recording;
 
 /// Columns of a recording in the order of the writer.
 const COLUMNS: [&str; 3] = ["time_s", "output", "input"];
+/// The same beside a set-point, where `input` and `output` alone may be those of the controller.
+const BESIDE_SET_POINT: [&str; 3] = ["time_s", "process_output", "process_input"];
 
-/// Writes rows of `time_s,output,input` and further columns after comments that start with `#`, in constant memory.
+/// Writes rows of `time_s,output,input` and further columns after comments that start with `#`, in constant memory. Beside a column
+/// `setpoint` the names are `process_output` and `process_input`.
 ///
 /// Each number is the shortest that reads back to the same bits.
 #[derive(Debug)]
@@ -28,7 +31,11 @@ impl<W: Write> CsvWriter<W> {
         {
             writeln!(out, "# {line}")?;
         }
-        writeln!(out, "{}", [&COLUMNS, more].concat().join(","))?;
+        let own = match more.contains(&"setpoint") {
+            true => &BESIDE_SET_POINT,
+            false => &COLUMNS,
+        };
+        writeln!(out, "{}", [own, more].concat().join(","))?;
         Ok(Self { out })
     }
 

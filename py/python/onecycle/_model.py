@@ -252,7 +252,7 @@ def experiment(model: Model, options: ExperimentOptions) -> Recording:
         if run.returncode != 0:
             sentence = run.stderr.strip().removeprefix("error: ").removeprefix("onecycle: ").split("\n\n")[0]
             raise _refused(re.sub(r"--([a-z][a-z0-9-]*)", lambda found: f"`{found[1].replace('-', '_')}`", sentence))
-        return Recording._of("experiment", _onecycle.read(path, [("input", "input"), ("output", "output")]))
+        return Recording._of("experiment", _onecycle.read(path, []))
 
 
 def simulate(model: Model, u: ArrayLike, sample_s: float) -> NDArray[np.float64]:
