@@ -47,10 +47,10 @@ pub(crate) fn named<'a>(
 pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> String {
     let mut text = format!(
         "{} recordings of each of {} kinds; wrong: a promise does not hold on the real plant\n\n\
-         {:<34} cases refused  named  remark: right wrong  silent: right wrong  unstable unnamed\n",
+         | kind | recordings | refused | named | other remark: right, wrong | silent: right, wrong | unstable | of these not named |\n\
+         | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         campaign.cases,
         campaign.kinds.len(),
-        "kind",
     );
     let kinds: Vec<_> = kinds(campaign, outcomes).collect();
     let [mut control, mut faulty] = [HonestyTally::default(); 2];
@@ -67,10 +67,9 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
         };
         *sum = sum.and(tally);
     }
-    text.push('\n');
     let all = control.and(faulty);
-    row(&mut text, "right data", &control);
-    row(&mut text, "wrong data", &faulty);
+    row(&mut text, "**right data**", &control);
+    row(&mut text, "**wrong data**", &faulty);
     row(&mut text, "all", &all);
     targets(&mut text, &control, &all);
     paper(&mut text, &kinds);
@@ -223,7 +222,7 @@ fn kinds<'a>(
 fn row(text: &mut String, name: &str, tally: &HonestyTally) {
     let _ = writeln!(
         text,
-        "{name:<34} {:5} {:7} {:6} {:14} {:5} {:14} {:5} {:9} {:7}",
+        "| {name} | {} | {} | {} | {}, {} | {}, {} | {} | {} |",
         tally.cases,
         tally.refused,
         tally.named,
