@@ -76,7 +76,7 @@ EXPERIMENTS = [
 @pytest.mark.parametrize(("model", "options", "words"), EXPERIMENTS, ids=lambda of: getattr(of, "structure", ""))
 def test_experiments_are_those_of_the_program(model, options, words, program, tmp_path):
     (tmp_path / "x.csv").write_text(program("simulate", *words.split()))
-    ours, theirs = onecycle.experiment(model, **options), onecycle.read(tmp_path / "x.csv", input="input", output="output")
+    ours, theirs = onecycle.experiment(model, **options), onecycle.read(tmp_path / "x.csv")
     assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.u, theirs.u) and np.array_equal(ours.y, theirs.y)
     assert (ours.r is None) == ("loop" not in options) and len(ours) > 100
 
