@@ -198,8 +198,9 @@ def _gaps(done: dict[int, int], count: int) -> Iterator[tuple[int, int]]:
 def _spread(
     client: Client, tasks: Callable[[int], Any], submit: Callable[[Client, Any], Any], keep: Callable[[Any, Any], None]
 ) -> None:
-    """Computes `submit(client, task)` a few ahead of what the cluster can do, and calls `keep(task, result)` as results arrive, in
-    any order. `tasks(threads)` is the next task for a cluster of this size, or None if there is none before another result."""
+    """Computes `submit(client, task)` for every task, with a few more waiting than the cluster has threads, and calls `keep(task, result)`
+    as results arrive, in any order. `tasks(threads)` returns the next task, cut for that number of threads; None if there is nothing to
+    hand out until another result has arrived."""
     import distributed
     from distributed.comm.core import CommClosedError
 
