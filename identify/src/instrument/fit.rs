@@ -11,6 +11,7 @@
 use std::ops::Range;
 
 use num_complex::Complex64;
+use onecycle_design::matrix::{cholesky, identity};
 use onecycle_design::{Linear, Structure};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -18,7 +19,6 @@ use rand_pcg::Pcg64Mcg;
 
 use super::spectra::Spectra;
 use crate::descent::{LeastSquares, Normal, Patience, descend};
-use onecycle_design::matrix::{cholesky, identity};
 
 /// Most unknowns: gain, two lags or a lag and a pair, a pole, dead time.
 const MOST: usize = 6;
@@ -262,22 +262,19 @@ impl Problem<'_> {
         steps
     }
 
-    /// Columns of the Jacobian in the units of [`Self::steps`].
-    fn columns(&self, point: &Point, errors: &[f64]) -> Vec<Vec<f64>> {
+    /// Normal equations in the units of [`Self::steps`].
+    fn normal(&self, point: &Point) -> Normal {
+        let errors = self.errors(&point.process());
         let steps = self.steps(point.structure);
-        (steps.iter().enumerate())
+        let columns: Vec<Vec<f64>> = (steps.iter().enumerate())
             .map(|(index, step)| {
                 let mut moved = *point;
                 moved.values[index] += step;
                 let moved = self.errors(&moved.process());
-                moved.iter().zip(errors).map(|(a, b)| a - b).collect()
+                moved.iter().zip(&errors).map(|(a, b)| a - b).collect()
             })
-            .collect()
-    }
-
-    fn normal(&self, point: &Point) -> Normal {
-        let errors = self.errors(&point.process());
-        Normal::new(&self.columns(point, &errors), &errors)
+            .collect();
+        Normal::new(&columns, &errors)
     }
 
     /// Processes drawn from the posterior about a fit, for flat priors of the unknowns: a Metropolis chain with steps of the
