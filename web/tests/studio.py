@@ -425,6 +425,7 @@ def outdated(browser, told):
     for pause_ms in (0, 150):
         page.fill("#more", f"--cycles {7 + pause_ms // 100}")
         page.focus("#more")
+        page.locator("#identify").scroll_into_view_if_needed()
         box = page.locator("#identify").bounding_box()
         page.mouse.move(box["x"] + 20, box["y"] + 10)
         page.mouse.down()
