@@ -297,20 +297,31 @@ fn was_at_rest(record: &Record, limits: &Limits, thetas: &[Theta]) -> bool {
     let Some(samples) = rows.min() else {
         return false;
     };
+    let all = (record.len() / samples) as f64;
     // On all rows, the first ones too, which were at rest or not: under the first input with an unknown state.
     let least_bic = |of: &Record| {
         let blocks = Blocks::from(of, samples, 0);
-        let bic = |theta: &Theta, at: &Evaluation| {
-            at.profile_bic + theta.free().len() as f64 * (at.rows() as f64).ln()
-        };
+        let bic = |theta: &Theta, at: &Evaluation| at.profile_bic(theta.free().len(), all);
         let starts = search::ranked(&blocks, thetas.iter().copied(), longest_tau_s, bic);
-        let fits = starts.iter().take(DESCENDED).filter_map(|(_, theta)| {
-            let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING)?;
-            Some(bic(&found.theta, &found.at))
+        let fits = starts.iter().take(DESCENDED).map(|(_, theta)| {
+            let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING);
+            let bic = found.map(|found| (bic(&found.theta, &found.at), found.theta));
+            bic.unwrap_or((f64::INFINITY, *theta))
         });
-        fits.fold(f64::INFINITY, f64::min)
+        fits.min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    least_bic(&record.at_rest()) < least_bic(record)
+    let Some((at_rest, theta)) = least_bic(&record.at_rest()) else {
+        return false;
+    };
+    // Under another constant input, which is one unknown more: what comes of it ends with the dead time, and no later row is worse.
+    let late = |theta: &Theta| {
+        let blocks = Blocks::new(record, samples, rows_for(record, theta).1);
+        let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING)?;
+        Some(found.at.profile_bic(theta.free().len() + 1, all))
+    };
+    let chosen = thetas.last().into_iter().chain([&theta]);
+    let late = chosen.filter_map(late).fold(f64::INFINITY, f64::min);
+    least_bic(record).is_none_or(|(free, _)| at_rest < free.min(late))
 }
 
 /// Step 2: the choice on the part of a record that tells most, and this part. The searches begin at `starts`, or where a

@@ -43,9 +43,8 @@ use super::theta::Theta;
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
     pub(super) log_likelihood: f64,
-    /// Bayesian information criterion of the linear unknowns alone, these at their best: comparable between starts with
-    /// another number of unknown states on the same rows.
-    pub(super) profile_bic: f64,
+    /// `-2 ln L` of a row, with all linear unknowns at their best instead of integrated out.
+    profile: f64,
     /// Residual `r` of each block that has samples, over [`Self::scale`].
     residual: Vec<f64>,
     /// `sum ln S_k + ln|X'X| - ln|X0'X0|`.
@@ -82,6 +81,13 @@ impl Evaluation {
     /// Number of rows: blocks that have samples.
     pub(super) fn rows(&self) -> usize {
         self.residual.len()
+    }
+
+    /// Bayesian information criterion with the linear unknowns at their best and `others` more, of `rows` rows that are as likely as
+    /// these: comparable between starts with another number of unknown states.
+    pub(super) fn profile_bic(&self, others: usize, rows: f64) -> f64 {
+        let linear = self.residual.len() as f64 - self.freedom;
+        (linear + others as f64) * rows.ln() + rows * self.profile
     }
 
     /// Deviation of the white noise of a sample that the record shows (output unit). Zero if it is only assumed.
@@ -253,15 +259,14 @@ fn filtered<const N: usize, const D: usize>(
     // With all linear unknowns at their best instead of integrated out.
     let all = count as f64;
     let (of_all, square) = of(all);
-    let profile = -0.5 * (all * (TWO_PI * of_all).ln() + square + log_variances);
-    let profile_bic = (responses + start.count) as f64 * all.ln() - 2.0 * profile;
+    let profile = (TWO_PI * of_all).ln() + (square + log_variances) / all;
     if !log_likelihood.is_finite() {
         return None;
     }
     let squared = variance * scale * scale;
     Some(Evaluation {
         log_likelihood,
-        profile_bic,
+        profile,
         residual: fit.residual,
         logs,
         freedom,
