@@ -9,9 +9,8 @@ use rand_pcg::Pcg64Mcg;
 const HEATER: [f64; 4] = [120.0, 600.0, 20.0, 5.0];
 const SAMPLE_S: f64 = 1.0;
 
-/// Response of the heater to a unit step `since` seconds ago, of which it is ahead by the dead time.
-fn response(since: f64) -> f64 {
-    let [gain, slow_s, fast_s, tau_s] = HEATER;
+/// Response of a process such as the heater to a unit step `since` seconds ago.
+fn response([gain, slow_s, fast_s, tau_s]: [f64; 4], since: f64) -> f64 {
     let s = (since - tau_s).max(0.0);
     gain * (1.0 - (slow_s * (-s / slow_s).exp() - fast_s * (-s / fast_s).exp()) / (slow_s - fast_s))
 }
@@ -23,8 +22,13 @@ struct Test {
 }
 
 impl Test {
-    /// `count` samples of the response to steps of the input, from rest at 22, with noise of 0.05. A step: its time and size.
+    /// `count` samples of the response of the heater to steps of the input, from rest at 22, with noise of 0.05. A step: its time
+    /// and size.
     fn of(steps: &[(f64, f64)], count: usize) -> Self {
+        Self::of_process(HEATER, steps, count)
+    }
+
+    fn of_process(process: [f64; 4], steps: &[(f64, f64)], count: usize) -> Self {
         let mut random = Pcg64Mcg::seed_from_u64(1);
         // Sum of twelve uniform numbers: nearly normal, of variance one.
         let mut noise = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
@@ -37,7 +41,7 @@ impl Test {
             input: time_s.iter().map(|t| total(*t, &|_| 1.0)).collect(),
             output: time_s
                 .iter()
-                .map(|t| 22.0 + total(*t, &response) + 0.05 * noise())
+                .map(|t| 22.0 + total(*t, &|since| response(process, since)) + 0.05 * noise())
                 .collect(),
             time_s,
         }
@@ -103,6 +107,27 @@ fn a_step_in_the_first_row_is_one_from_zero_or_from_the_stated_input() {
     let stated = test.identify(&Options::default().input_before(Some(0.2)));
     is_heater(&stated, "stated");
     assert!(!stated.remarks.contains(&Remark::AssumedRest));
+}
+
+// Before a test that starts in the first row the process was at rest, but not under the first input. After a dead time as long as
+// this a fit from rest under it makes up for the missing step with an integrator.
+#[test]
+fn a_test_that_starts_in_the_first_row_is_not_from_rest_under_its_first_input() {
+    let switch = |k: u32| {
+        (
+            75.0 * f64::from(k) - 15.0,
+            if k % 2 == 0 { 1.0 } else { -1.0 },
+        )
+    };
+    let steps: Vec<(f64, f64)> = std::iter::once((0.0, 0.5))
+        .chain((1..26).map(switch))
+        .collect();
+    let [gain, slow_s, fast_s, _] = HEATER;
+    let test = Test::of_process([gain, slow_s, fast_s, 45.0], &steps, 2000);
+    is_heater(
+        &test.identify(&Options::default()),
+        "square wave from the first row",
+    );
 }
 
 // One exponential may have begun long ago: it does not tell the gain.
