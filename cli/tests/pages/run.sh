@@ -3,8 +3,9 @@
 # labels, margins, themes and print. Status 1 at the first fault.
 #   --screenshots DIR     also saves screenshots
 #   --picture FILE.png    also makes the README's picture
-# PYTHON names an interpreter with the packages of requirements.txt; by default they are installed into a temporary
-# virtual environment. CHROMIUM names the browser [default: chromium].
+# ONECYCLE_LAB names the program onecycle-lab; by default it is built here. PYTHON names an interpreter with the packages of
+# requirements.txt; by default they are installed into a temporary virtual environment. CHROMIUM names the browser
+# [default: chromium].
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -14,10 +15,13 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
 cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --bin onecycle --target-dir "$target"
-cargo build --quiet --locked --manifest-path "$root/research/Cargo.toml" --bin onecycle-lab --target-dir "$target"
+if [[ -z ${ONECYCLE_LAB:-} ]]; then
+    cargo build --quiet --locked --manifest-path "$root/research/Cargo.toml" --bin onecycle-lab --target-dir "$target"
+    ONECYCLE_LAB=$target/debug/onecycle-lab
+fi
 if [[ -z ${PYTHON:-} ]]; then
     python3 -m venv "$scratch/venv"
     PYTHON=$scratch/venv/bin/python
     "$PYTHON" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
 fi
-"$PYTHON" "$here/pages.py" "$target/release/onecycle" "$target/debug/onecycle-lab" "$root/examples" "$scratch" "$@"
+"$PYTHON" "$here/pages.py" "$target/release/onecycle" "$ONECYCLE_LAB" "$root/examples" "$scratch" "$@"
