@@ -264,8 +264,12 @@ impl Search<'_> {
         components: &[Component],
     ) -> Option<Verdict> {
         let theta = &fitted.best.found.theta;
-        let gain = |component: &Component| component.laplace.gain_deviation(&component.found);
-        let deviation = components.first().map(gain).filter(|v| v.is_finite());
+        let band = (self.excitation).and_then(|found| found.informative_rad_per_s);
+        let deviation = |Component { laplace, found, .. }: &Component| match band {
+            Some((low, high)) => laplace.response_deviation(found, (low * high).sqrt()),
+            None => laplace.gain_deviation(found),
+        };
+        let deviation = components.first().map(deviation).filter(|v| v.is_finite());
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
             return Some(self.no_information(theta, deviation));
         }

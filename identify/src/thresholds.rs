@@ -7,8 +7,8 @@ use onecycle_design::Parameter;
 
 // What the recording tells.
 
-/// Relative standard deviation of the gain. Above: `no_information`. Judgement: with two deviations
-/// the gain is wrong by more than half.
+/// Relative standard deviation of the gain, as the response has it in the middle of the frequencies that tell it. Above:
+/// `no_information`. Judgement: with two deviations the gain is wrong by more than half.
 pub(crate) const MOST_DEVIATION: f64 = 0.3;
 /// Half width of the 90 % interval of the gain over the estimate. Above: `no_information`. Judgement: as [`MOST_DEVIATION`].
 pub(crate) const MOST_WIDTH: f64 = 0.5;
@@ -47,8 +47,8 @@ pub(crate) const BEYOND_DOUBT: f64 = 0.98;
 pub(crate) const EXPECTED_ERROR_RATIO: f64 = 2.0;
 /// The same: see [`LEAST_PREDICTED`].
 pub(crate) const MOST_ERROR_RATIO: f64 = 4.0;
-/// Share of the input's changes in the last third, which has a third of them in a steady test. Below: the end is calm, and the
-/// prediction is measured against the movement of all. Judgement.
+/// Variance of the response to the input in the last third over that in all of the record. Below: the end is calm, and the prediction
+/// is measured against the movement of all. Judgement.
 pub(crate) const CALM_END: f64 = 0.1;
 /// Share of the output's square that a fit without disturbances may leave under feedback. Above: the disturbances stay. Argument: an
 /// input that followed all of the disturbance would bias the response by the root, 20 %; it follows a part.

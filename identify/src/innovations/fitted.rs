@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use onecycle_design::{LowPass, Structure};
 
-use super::choose::{Choice, Limits, choose};
+use super::choose::{Choice, Limits, NEARLY, choose};
 use super::likelihood::Evaluation;
 use super::mixture::{self, Component};
 use super::prepare::Prepared;
@@ -17,7 +17,7 @@ use crate::outcome::Prediction;
 use crate::progress;
 use crate::remark::Remark;
 use crate::settings::Options;
-use crate::signals::range;
+use crate::signals::{is_constant, range};
 use crate::thresholds::{LEAST_PREDICTED, MOST_ERROR_RATIO};
 use crate::verdict::Verdict;
 
@@ -127,10 +127,15 @@ impl Fitted {
             }
         }
         let blocks = Blocks::new(&record, samples, limits.skip_s);
-        let damped = choice
-            .damped(best.structure())
-            .map(|damped| damped.found.theta);
-        let wider = damped.and_then(|theta| search::fit(&blocks, &theta, longest));
+        let wider = choice.damped(best.structure()).and_then(|damped| {
+            let starts = search::derive(&best.found.theta, damped.structure(), record.dt_s);
+            let starts = starts.into_iter().chain([damped.found.theta]);
+            let fits = starts.filter_map(|theta| search::fit(&blocks, &theta, longest));
+            // It has the best one as its limit: another fit of it is a worse explanation.
+            let least = best.log_likelihood() - NEARLY;
+            fits.filter(|fit| fit.log_likelihood() > least)
+                .max_by(|a, b| a.log_likelihood().total_cmp(&b.log_likelihood()))
+        });
         let mut fitted = Self {
             part,
             choice,
@@ -277,51 +282,80 @@ fn choose_start(
         let at_rest = record.at_rest().rounded(CHOOSING_STAMP);
         let mut starts = search::screen_whole(&at_rest, limits.structure, limits.longest_tau_s);
         starts.extend(choice.and_then(Choice::chosen).map(|of| of.found.theta));
-        if progress::part(FREE..RESTED, || was_at_rest(record, limits, &starts)) {
-            *record = record.at_rest();
-            starts.extend(choice.iter().flat_map(|choice| choice.thetas()));
-            return progress::part(RESTED..1.0, || {
-                choose_on_parts(record, limits, options, &starts, remarks)
-            });
+        let before = progress::part(FREE..RESTED, || before(record, limits, &starts));
+        let mut limits = *limits;
+        match before {
+            Before::Rest => *record = record.at_rest(),
+            Before::Another { skip_s } if skip_s > SKIPPED * record.time_s(record.len() - 1) => {
+                limits.skip_s = skip_s;
+            }
+            _ => {
+                remarks.append(&mut of_free);
+                return free;
+            }
         }
+        starts.extend(choice.iter().flat_map(|choice| choice.thetas()));
+        return progress::part(RESTED..1.0, || {
+            choose_on_parts(record, &limits, options, &starts, remarks)
+        });
     }
     remarks.append(&mut of_free);
     free
 }
 
-/// Whether the process was at rest under the first input when the record began: whether that explains the record better than
-/// an unknown state, from each of `thetas`.
-fn was_at_rest(record: &Record, limits: &Limits, thetas: &[Theta]) -> bool {
+/// What was before a record.
+enum Before {
+    /// Rest under the first input.
+    Rest,
+    /// Any state under the first input, or under another one of which nothing shows.
+    Unknown,
+    /// Another input, whose effect lasts until `skip_s`.
+    Another { skip_s: f64 },
+}
+
+/// What explains the beginning of a record best, from each of `thetas`.
+fn before(record: &Record, limits: &Limits, thetas: &[Theta]) -> Before {
     let longest_tau_s = limits.longest_tau_s;
     let rows = thetas.iter().map(|theta| rows_for(record, theta).0);
     let Some(samples) = rows.min() else {
-        return false;
+        return Before::Unknown;
     };
     let all = (record.len() / samples) as f64;
-    // On all rows, the first ones too, which were at rest or not: under the first input with an unknown state.
-    let least_bic = |of: &Record| {
+    let bic = |theta: &Theta, at: &Evaluation| at.profile_bic(theta.free().len(), all);
+    let fit = |blocks: &Blocks<'_>, theta: &Theta| {
+        search::warm(blocks, theta, longest_tau_s, search::CHOOSING)
+    };
+    // On all rows, the first ones too.
+    let least = |of: &Record| {
         let blocks = Blocks::from(of, samples, 0);
-        let bic = |theta: &Theta, at: &Evaluation| at.profile_bic(theta.free().len(), all);
         let starts = search::ranked(&blocks, thetas.iter().copied(), longest_tau_s, bic);
-        let fits = starts.iter().take(DESCENDED).map(|(_, theta)| {
-            let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING);
-            let bic = found.map(|found| (bic(&found.theta, &found.at), found.theta));
-            bic.unwrap_or((f64::INFINITY, *theta))
+        let fits = starts.iter().take(DESCENDED).filter_map(|(_, theta)| {
+            let found = fit(&blocks, theta)?;
+            Some((bic(&found.theta, &found.at), found.theta))
         });
         fits.min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let Some((at_rest, theta)) = least_bic(&record.at_rest()) else {
-        return false;
+    let at_rest = least(&record.at_rest());
+    let least_bic = |found: Option<(f64, Theta)>| found.map_or(f64::INFINITY, |(bic, _)| bic);
+    // Another constant input is one unknown more. What comes of it ends with the dead time: the rows before are as likely as those
+    // after it, by chance three deviations of their chi-squared more.
+    let after = |theta: &Theta| {
+        let skip_s = rows_for(record, theta).1;
+        let found = fit(&Blocks::new(record, samples, skip_s), theta)?;
+        let bic = found.at.profile_bic(theta.free().len() + 1, all);
+        let chance = 3.0 * (2.0 * (all - found.at.rows() as f64)).max(0.0).sqrt();
+        let is_told = !is_constant(&record.input[record.skipped(skip_s)..]);
+        is_told.then_some((bic + chance + NEARLY, skip_s))
     };
-    // Under another constant input, which is one unknown more: what comes of it ends with the dead time, and no later row is worse.
-    let late = |theta: &Theta| {
-        let blocks = Blocks::new(record, samples, rows_for(record, theta).1);
-        let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING)?;
-        Some(found.at.profile_bic(theta.free().len() + 1, all))
-    };
-    let chosen = thetas.last().into_iter().chain([&theta]);
-    let late = chosen.filter_map(late).fold(f64::INFINITY, f64::min);
-    least_bic(record).is_none_or(|(free, _)| at_rest < free.min(late))
+    let at_rest_theta = at_rest.map(|(_, theta)| theta);
+    let of_another = thetas.last().into_iter().chain(&at_rest_theta);
+    let another = (of_another.filter_map(after)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let (at_rest, unknown) = (least_bic(at_rest), least_bic(least(record)));
+    match another {
+        Some((bic, skip_s)) if bic < at_rest.min(unknown) => Before::Another { skip_s },
+        _ if at_rest < unknown => Before::Rest,
+        _ => Before::Unknown,
+    }
 }
 
 /// Step 2: the choice on the part of a record that tells most, and this part. The searches begin at `starts`, or where a
@@ -337,11 +371,10 @@ fn choose_on_parts(
     let mut parts = excited_parts(record);
     let mut done = 0.0;
     while let Some(part) = parts.pop() {
-        let fewest = limits.fewest_samples;
         // The part and those that are left share what is to do; one more may be found in it.
         let end = done + (1.0 - done) / (parts.len() + 1) as f64;
         let choice = progress::part(done..end, || {
-            choose_on(record, part.clone(), fewest, options, starts, remarks)
+            choose_on(record, part.clone(), limits, options, starts, remarks)
         });
         done = end;
         let Some(choice) = choice else {
@@ -351,7 +384,7 @@ fn choose_on_parts(
         let row_s = choice.samples as f64 * record.dt_s;
         let shortest_s = (choice.chosen()).map(|found| found.found.theta.shortest_lag_s());
         let length = part.len() / search::ZOOM;
-        if choice.samples > fewest
+        if choice.samples > limits.fewest_samples
             && length > LEAST_PART
             && shortest_s.is_some_and(|lag_s| lag_s < 2.0 * row_s)
         {
@@ -367,7 +400,7 @@ fn choose_on_parts(
 fn choose_on(
     record: &mut Record,
     part: Range<usize>,
-    fewest_samples: usize,
+    limits: &Limits,
     options: &Options,
     starts: &[Theta],
     remarks: &mut Vec<Remark>,
@@ -378,11 +411,10 @@ fn choose_on(
     part.rest = part.rest.or(record.rest.map(|_| part.input[0]));
     let length_s = part.time_s(part.len() - 1);
     let limits = Limits {
-        skip_s: SKIPPED * length_s,
+        skip_s: limits.skip_s.max(SKIPPED * length_s),
         longest_tau_s: LONGEST_TAU * length_s,
         slowest_s,
-        structure: options.structure,
-        fewest_samples,
+        ..*limits
     };
     let mut choice = choose(&part, &limits, starts);
     if record.hold == Hold::Held

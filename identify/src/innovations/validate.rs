@@ -214,9 +214,10 @@ pub(super) fn prediction(
     if count < 10.0 {
         return None;
     }
-    // Where the input hardly changes any more the output may have settled, and nothing is left to predict: what the whole
-    // record moves by is the measure then.
-    let every: Vec<f64> = match changes_after(&whole, blocks.len()) < CALM_END {
+    // Where the input hardly moves the output any more, since it has settled or is too fast, nothing is left to predict: what the
+    // whole record moves by is the measure then.
+    let (of_all, of_end) = (&found.forced[..], &found.forced[blocks.len()..]);
+    let every: Vec<f64> = match variance(of_end) < CALM_END * variance(of_all) {
         true => (0..whole.len()).filter_map(measured).collect(),
         false => pairs.iter().map(|(value, _)| *value).collect(),
     };
@@ -232,17 +233,6 @@ pub(super) fn prediction(
         explained: 1.0 - error / variance,
         error_ratio: error / (count * found.ahead_variance),
     })
-}
-
-/// Share of the squared changes of the input that lie after a block.
-fn changes_after(blocks: &Blocks<'_>, block: usize) -> f64 {
-    let inputs = blocks.mean_inputs();
-    let changes: Vec<f64> = inputs
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]).powi(2))
-        .collect();
-    let later: f64 = changes.iter().skip(block).sum();
-    later / changes.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// Frequencies that a record tells about.
@@ -378,6 +368,11 @@ pub(super) fn shortest_period_s(blocks: &Blocks<'_>) -> Option<f64> {
 
 fn mean(rows: &[f64]) -> f64 {
     rows.iter().sum::<f64>() / rows.len() as f64
+}
+
+fn variance(rows: &[f64]) -> f64 {
+    let mean = mean(rows);
+    rows.iter().map(|row| (row - mean).powi(2)).sum::<f64>() / rows.len() as f64
 }
 
 /// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` about their mean lie. `None` without power.
