@@ -194,11 +194,11 @@ impl Search<'_> {
         if informative.is_some_and(|band| validate::input_share(blocks, band) <= LEAST_POWER) {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
-        // Without disturbances a few sines fit a few others.
+        // A few sines fit a few others. Steps are many, however few show over a lag.
         let unknowns = fitted.best.found.theta.free().len() + 1;
-        if fitted.disturbances != Disturbances::Kept
-            && validate::order_of_excitation(blocks, LEAST_POWER) < unknowns
-        {
+        let is_smooth =
+            fitted.disturbances != Disturbances::Kept || !blocks.record.keeps_its_input();
+        if is_smooth && validate::order_of_excitation(blocks, LEAST_POWER) < unknowns {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
         let rows = fitted.best.found.at.rows();
@@ -265,9 +265,19 @@ impl Search<'_> {
     ) -> Option<Verdict> {
         let theta = &fitted.best.found.theta;
         let band = (self.excitation).and_then(|found| found.informative_rad_per_s);
-        let deviation = |Component { laplace, found, .. }: &Component| match band {
-            Some((low, high)) => laplace.response_deviation(found, (low * high).sqrt()),
-            None => laplace.gain_deviation(found),
+        // Lags that are not told apart leave the gain in front of them open, but not the response, if there are frequencies for all
+        // unknowns.
+        let of_response = |Component { laplace, found, .. }: &Component| {
+            let (low, high) = band?;
+            let is_told = validate::order_of_excitation(blocks, LEAST_POWER) > theta.free().len();
+            is_told.then(|| laplace.response_deviation(found, (low * high).sqrt()))
+        };
+        let deviation = |component: &Component| {
+            let of_gain = component.laplace.gain_deviation(&component.found);
+            match of_gain > MOST_DEVIATION {
+                true => of_response(component).map_or(of_gain, |of| of.min(of_gain)),
+                false => of_gain,
+            }
         };
         let deviation = components.first().map(deviation).filter(|v| v.is_finite());
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
