@@ -264,22 +264,8 @@ impl Search<'_> {
         components: &[Component],
     ) -> Option<Verdict> {
         let theta = &fitted.best.found.theta;
-        let band = (self.excitation).and_then(|found| found.informative_rad_per_s);
-        // Lags that are not told apart leave the gain in front of them open, but not the response, if there are frequencies for all
-        // unknowns.
-        let of_response = |Component { laplace, found, .. }: &Component| {
-            let (low, high) = band?;
-            let is_told = validate::order_of_excitation(blocks, LEAST_POWER) > theta.free().len();
-            is_told.then(|| laplace.response_deviation(found, (low * high).sqrt()))
-        };
-        let deviation = |component: &Component| {
-            let of_gain = component.laplace.gain_deviation(&component.found);
-            match of_gain > MOST_DEVIATION {
-                true => of_response(component).map_or(of_gain, |of| of.min(of_gain)),
-                false => of_gain,
-            }
-        };
-        let deviation = components.first().map(deviation).filter(|v| v.is_finite());
+        let gain = |component: &Component| component.laplace.gain_deviation(&component.found);
+        let deviation = components.first().map(gain).filter(|v| v.is_finite());
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
             return Some(self.no_information(theta, deviation));
         }

@@ -7,8 +7,8 @@ use onecycle_design::Parameter;
 
 // What the recording tells.
 
-/// Relative standard deviation of the gain, and of the response in the middle of the frequencies that tell it. Both above:
-/// `no_information`. Judgement: with two deviations the gain is wrong by more than half.
+/// Relative standard deviation of the gain. Above: `no_information`. Judgement: with two deviations
+/// the gain is wrong by more than half.
 pub(crate) const MOST_DEVIATION: f64 = 0.3;
 /// Half width of the 90 % interval of the gain over the estimate. Above: `no_information`. Judgement: as [`MOST_DEVIATION`].
 pub(crate) const MOST_WIDTH: f64 = 0.5;

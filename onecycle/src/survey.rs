@@ -12,11 +12,13 @@ use crate::builder::Identify;
 use crate::error::Error;
 use crate::log_gains::{self, LogLoop};
 use crate::request::Request;
-use crate::results::answer::Advice;
+use crate::results::answer::{Advice, Answer};
 use crate::results::controllers::Controllers;
 use crate::results::flight::{FlightLoop, Found, Part, Refusal, Shown, Survey};
 use crate::source::{LogFile, Source};
 use crate::threads::each;
+use crate::words::answer::refused;
+use crate::words::flight as words;
 use crate::words::log::of_firmware;
 use crate::words::units::Units;
 
@@ -122,13 +124,26 @@ fn of_loop(
             choice = choice.with_trade_off(&best.for_design(0).0);
             of.gains = Some(gains);
         }
-        one.answer = Some(answer);
+        one.answer = answer;
         one.choice = Some(choice);
         break;
     }
-    let at = one.best().unwrap_or(0);
-    one.shown = shown.into_iter().nth(at);
+    let at = one.best();
+    one.shown = shown.into_iter().nth(at.unwrap_or(0));
+    if at.is_none() {
+        one.answer = none_told(&one);
+    }
     Ok(one)
+}
+
+/// The answer where no part tells anything.
+fn none_told(one: &FlightLoop) -> Answer {
+    let verdict =
+        (one.shown.as_ref()).and_then(|shown| shown.identification.outcome.as_ref().err());
+    Answer {
+        next: verdict.map_or_else(String::new, |verdict| refused(verdict).1),
+        ..Answer::not_yet(words::none_told(&one.parts))
+    }
 }
 
 /// The part of a flight that tells most about a loop, as in the table of all loops, with how and what was identified from it; if none
@@ -194,7 +209,7 @@ fn parts(signals: &Signals, flight: &Flight, asked: &Specification) -> (FlightLo
         units: signals.units,
         parts,
         choice: None,
-        answer: None,
+        answer: Answer::not_yet(String::new()),
         to_write: None,
         shown: None,
     };

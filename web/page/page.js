@@ -360,14 +360,13 @@ const VERDICTS = { change: "CHANGE", keep: "KEEP YOURS", first_gains: "FIRST GAI
 let surveyed;
 const forgetSurvey = () => { surveyed = undefined; at("surveyed").hidden = at("all").hidden = true; };
 // What to do about a loop, as the program's card says it.
-const loopCard = ({ name, answer, parts }) => {
-  const card = make("div", null, { className: `card ${answer?.verdict ?? "not_yet"}` });
+const loopCard = ({ name, answer }) => {
+  const card = make("div", null, { className: `card ${answer.verdict}` });
   const title = make("h3"), button = make("button", name, { type: "button" });
   button.onclick = () => openLoop(name);
   title.append(button);
-  const why = answer ? answer.reason : parts[0]?.verdict.replaceAll("_", " ") ?? "no part of the flight can be used";
-  card.append(title, make("p", `${VERDICTS[answer?.verdict ?? "not_yet"]}: ${why.replace(/\.$/, "")}.`));
-  if (answer?.verdict !== "change" && answer?.verdict !== "first_gains") return card;
+  card.append(title, make("p", `${VERDICTS[answer.verdict]}: ${answer.reason.replace(/\.$/, "")}.`));
+  if (answer.verdict !== "change" && answer.verdict !== "first_gains") return card;
   const table = make("table"), body = make("tbody"), head = make("tr");
   for (const title of ["gain", "now", "half", "full"]) head.append(make("th", title, { scope: "col" }));
   table.append(make("thead"), body);

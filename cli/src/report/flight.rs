@@ -48,13 +48,9 @@ fn card(of: &Survey, has_details: bool) -> String {
     let mut has_titles = false;
     for one in &of.loops {
         let name = format!("{:<15} ", one.control_loop.to_string());
-        let Some(answer) = &one.answer else {
-            answer::verdict(&mut text, &name, Advice::NotYet, &refused(one));
-            continue;
-        };
-        answer::verdict(&mut text, &name, answer.verdict, &answer.reason);
-        if answer.verdict != Advice::Keep {
-            answer::gains_and_margins(&mut text, answer, !has_titles);
+        answer::verdict(&mut text, &name, one.answer.verdict, &one.answer.reason);
+        if one.best().is_some() && one.answer.verdict != Advice::Keep {
+            answer::gains_and_margins(&mut text, &one.answer, !has_titles);
             has_titles = true;
         }
         if let Some((gain, delay)) = process(one) {
@@ -74,7 +70,7 @@ fn card(of: &Survey, has_details: bool) -> String {
 
 /// What to do next.
 pub(super) fn next(of: &Survey) -> String {
-    let is_told = of.loops.iter().any(|one| one.answer.is_some());
+    let is_told = of.loops.iter().any(|one| one.best().is_some());
     match (&of.files, step(of)) {
         (Some(files), _) => answers::written(files),
         _ if !is_told => words::NO_LOOP.to_owned(),
@@ -85,19 +81,9 @@ pub(super) fn next(of: &Survey) -> String {
 
 /// Share of the way to the proposed gains that is written. `None` if every loop is kept.
 fn step(of: &Survey) -> Option<f64> {
-    let answers = of.loops.iter().filter_map(|one| one.answer.as_ref());
+    let answers = of.loops.iter().map(|one| &one.answer);
     let mut changes = answers.filter(|answer| answer.verdict == Advice::Change);
     changes.next()?.step
-}
-
-/// Why no part of the flight tells anything about a loop.
-pub(super) fn refused(one: &FlightLoop) -> String {
-    let mut refusals = one
-        .parts
-        .iter()
-        .filter_map(|part| part.outcome.as_ref().err());
-    let reason = refusals.next().map(words::brief);
-    reason.unwrap_or_else(|| words::NO_PART_IN_BRIEF.to_owned())
 }
 
 /// The line of a loop: what all its parts tell.

@@ -127,15 +127,7 @@ impl Fitted {
             }
         }
         let blocks = Blocks::new(&record, samples, limits.skip_s);
-        let wider = choice.damped(best.structure()).and_then(|damped| {
-            let starts = search::derive(&best.found.theta, damped.structure(), record.dt_s);
-            let starts = starts.into_iter().chain([damped.found.theta]);
-            let fits = starts.filter_map(|theta| search::fit(&blocks, &theta, longest));
-            // It has the best one as its limit: another fit of it is a worse explanation.
-            let least = best.log_likelihood() - NEARLY;
-            fits.filter(|fit| fit.log_likelihood() > least)
-                .max_by(|a, b| a.log_likelihood().total_cmp(&b.log_likelihood()))
-        });
+        let wider = damped(&blocks, &choice, &best, longest);
         let mut fitted = Self {
             part,
             choice,
@@ -265,6 +257,22 @@ impl Fitted {
     }
 }
 
+/// The fit of the structure that has the damping which that of `best` lacks, its limit: a fit of it that explains less is in another
+/// basin.
+fn damped(
+    blocks: &Blocks<'_>,
+    choice: &Choice,
+    best: &Candidate,
+    longest_tau_s: f64,
+) -> Option<Candidate> {
+    let damped = choice.damped(best.structure())?;
+    let starts = search::derive(&best.found.theta, damped.structure(), blocks.record.dt_s);
+    let starts = starts.into_iter().chain([damped.found.theta]);
+    let fits = starts.filter_map(|theta| search::fit(blocks, &theta, longest_tau_s));
+    fits.filter(|fit| fit.log_likelihood() > best.log_likelihood() - NEARLY)
+        .max_by(|a, b| a.log_likelihood().total_cmp(&b.log_likelihood()))
+}
+
 /// Step 2, with the state at the start unknown, and at rest if that explains the whole record better, which the record then
 /// keeps; unless it is known.
 fn choose_start(
@@ -295,9 +303,10 @@ fn choose_start(
             }
         }
         starts.extend(choice.iter().flat_map(|choice| choice.thetas()));
-        return progress::part(RESTED..1.0, || {
+        let again = progress::part(RESTED..1.0, || {
             choose_on_parts(record, &limits, options, &starts, remarks)
         });
+        return again.or(free);
     }
     remarks.append(&mut of_free);
     free

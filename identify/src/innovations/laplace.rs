@@ -105,42 +105,14 @@ impl Laplace {
 
     /// Relative standard deviation of the gain; where lags are nearly equal, of the gain times [`NearLags::symmetric`].
     pub(super) fn gain_deviation(&self, found: &Found) -> f64 {
-        let unknown = self.gain_slopes(found);
-        self.relative_deviation(found, &unknown)
-    }
-
-    /// Relative standard deviation of the size of the frequency response at `omega_rad_per_s`: lags that are not told apart do not
-    /// count where their product is told.
-    pub(super) fn response_deviation(&self, found: &Found, omega_rad_per_s: f64) -> f64 {
-        /// Part of the deviation of an unknown over which the response is nearly linear.
-        const PART: f64 = 0.01;
-        let log_size = |theta: &Theta| {
-            let response = theta.process(1.0).frequency_response(omega_rad_per_s);
-            (response.norm() / self.near.symmetric(theta)).ln()
-        };
-        let mut slopes = self.gain_slopes(found);
-        for (slot, (slope, &index)) in slopes.iter_mut().zip(&self.free).enumerate() {
-            let step = PART * self.covariance[slot][slot].sqrt();
-            let ([below, above], span) = self.near.ends(&found.theta, index, step);
-            *slope += (log_size(&above) - log_size(&below)) / span;
-        }
-        self.relative_deviation(found, &slopes)
-    }
-
-    /// Derivatives of the logarithm of the gain; where lags are nearly equal, of the gain times [`NearLags::symmetric`].
-    fn gain_slopes(&self, found: &Found) -> Vec<f64> {
-        let gain = self.near.symmetric(&found.theta) * found.at.gain;
-        self.slopes.iter().map(|slope| slope[0] / gain).collect()
-    }
-
-    /// Standard deviation of the logarithm of what is the gain times a function of the unknowns with these derivatives.
-    fn relative_deviation(&self, found: &Found, slopes: &[f64]) -> f64 {
-        let at = &found.at;
-        let n = slopes.len();
+        let (at, symmetric) = (&found.at, self.near.symmetric(&found.theta));
+        let n = self.free.len();
+        let slope = |i: usize| self.slopes[i][0];
         let through: f64 = (0..n * n)
-            .map(|k| slopes[k / n] * self.covariance[k / n][k % n] * slopes[k % n])
+            .map(|k| slope(k / n) * self.covariance[k / n][k % n] * slope(k % n))
             .sum();
-        (at.gain_factor * at.variance / (at.gain * at.gain) + through).sqrt()
+        let own = at.gain_factor * at.variance;
+        (own + through / (symmetric * symmetric)).sqrt() / at.gain.abs()
     }
 
     /// `ln det(covariance) / 2`.

@@ -116,7 +116,7 @@ fn a_test_that_starts_in_the_first_row_is_not_from_rest_under_its_first_input() 
     let switch = |k: u32| {
         (
             75.0 * f64::from(k) - 15.0,
-            if k % 2 == 0 { 1.0 } else { -1.0 },
+            if k.is_multiple_of(2) { 1.0 } else { -1.0 },
         )
     };
     let steps: Vec<(f64, f64)> = std::iter::once((0.0, 0.5))

@@ -22,7 +22,7 @@ struct Report<'a> {
 #[derive(Serialize)]
 struct Loop<'a> {
     name: String,
-    answer: Option<&'a Answer>,
+    answer: &'a Answer,
     not_written: Option<&'a str>,
     gain: Option<[f64; 3]>,
     gain_unit: Option<String>,
@@ -85,7 +85,7 @@ fn loop_report(one: &FlightLoop) -> Loop<'_> {
     let first = told.first();
     Loop {
         name: one.control_loop.to_string(),
-        answer: one.answer.as_ref(),
+        answer: &one.answer,
         not_written: (one.to_write.as_ref())
             .and_then(|written| written.as_ref().err())
             .map(String::as_str),

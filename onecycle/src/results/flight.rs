@@ -18,8 +18,8 @@ pub struct FlightLoop {
     pub parts: Vec<Part>,
     /// Controllers for the process of the best part.
     pub choice: Option<Controllers>,
-    /// What to do about the gains. `None`: no part tells anything.
-    pub answer: Option<Answer>,
+    /// What to do about the gains.
+    pub answer: Answer,
     /// The parameters to write, or the reason why they must not be written. `None` without `--write`, and for a loop that is kept.
     pub to_write: Option<Result<Written, String>>,
     /// What a page shows of it. `None`: no part can be used.

@@ -2,7 +2,7 @@
 
 use onecycle_link::ControlLoop;
 
-use crate::results::flight::Refusal;
+use crate::results::flight::{Part, Refusal};
 use crate::words::number::short;
 use crate::words::units::ratio;
 
@@ -10,7 +10,7 @@ pub const NOTHING_LOGGED: &str =
     "The log has input and output of no control loop. `log FILE` says what to log.";
 pub const NO_PART: &str = "No part of the flight can be used: the vehicle was not armed and in the air for 5 s, or \
                                   the actuator was at its limit.";
-pub const NO_PART_IN_BRIEF: &str = "no part of the flight can be used";
+const NO_PART_IN_BRIEF: &str = "no part of the flight can be used";
 pub const NO_LOOP: &str = "Fly a chirp, or 30 s of quick stick movements on each axis. What each part of this flight told: \
                                   `details`.";
 pub const MORE: &str = "Process, parts and other figures: `details`; one loop: `axis=AXIS`";
@@ -37,6 +37,13 @@ pub fn brief(refusal: &Refusal) -> String {
             clause.split(':').next().unwrap_or_default().to_owned()
         }
     }
+}
+
+/// Why no part of a flight tells anything about a loop.
+pub(crate) fn none_told(parts: &[Part]) -> String {
+    let mut refusals = parts.iter().filter_map(|part| part.outcome.as_ref().err());
+    let reason = refusals.next().map(brief);
+    reason.unwrap_or_else(|| NO_PART_IN_BRIEF.to_owned())
 }
 
 /// A gain that the loop cannot have.

@@ -2,7 +2,7 @@
 
 use super::{Subject, card, made_by};
 use crate::pages::page::{self, Tab};
-use crate::report::flight::{next, refused};
+use crate::report::flight::next;
 use crate::results::answer::Answer;
 use crate::results::flight::{FlightLoop, Survey};
 use crate::words::answer as answers;
@@ -59,19 +59,15 @@ fn id(one: &FlightLoop) -> String {
     one.control_loop.to_string().replace(' ', "-")
 }
 
-/// The answer of a loop, or why no part of the flight tells anything about it.
+/// The answer of a loop, with all that is known of why no part of the flight tells anything about it.
 fn answer(one: &FlightLoop) -> Answer {
     let verdict =
         (one.shown.as_ref()).and_then(|shown| shown.identification.outcome.as_ref().err());
-    match (&one.answer, verdict) {
-        (Some(answer), _) => answer.clone(),
-        (None, Some(verdict)) => {
-            let (reason, next) = answers::refused(verdict);
-            Answer {
-                next,
-                ..Answer::not_yet(reason)
-            }
-        }
-        (None, None) => Answer::not_yet(refused(one)),
+    match verdict {
+        Some(verdict) if one.best().is_none() => Answer {
+            reason: answers::refused(verdict).0,
+            ..one.answer.clone()
+        },
+        _ => one.answer.clone(),
     }
 }
