@@ -39,17 +39,19 @@ fn a_row_for_each_kind() {
     let table = run(&["campaign", &path]);
     assert_eq!(table.code, Some(0), "{table:?}");
     let row = |name: &str| -> Vec<usize> {
-        let line = (table.stdout.lines()).find(|line| line.starts_with(name));
-        let words = line.unwrap()[name.len()..].split_whitespace();
-        words.map(|word| word.parse().unwrap()).collect()
+        let head = format!("| {name} |");
+        let line = (table.stdout.lines()).find_map(|line| line.strip_prefix(&head));
+        let words = line.unwrap().split([' ', ',', '|']);
+        let numbers = words.filter(|word| !word.is_empty());
+        numbers.map(|word| word.parse().unwrap()).collect()
     };
-    let right = row("right ");
+    let right = row("right");
     assert_eq!(right[..3], [1, 0, 0]);
     assert_eq!(right[3] + right[5], 1, "{right:?}");
     assert_eq!(row("swapped"), [1, 1, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(row("clipped"), [1, 1, 0, 0, 0, 0, 0, 0, 0]);
     assert_eq!(row("wrong sign"), [1, 0, 1, 0, 0, 0, 0, 1, 0]);
-    assert_eq!(row("wrong data")[..3], [3, 2, 1]);
+    assert_eq!(row("**wrong data**")[..3], [3, 2, 1]);
     for target in [
         "silent and wrong         0.0 % (target: 1 % at most)",
         "unstable and not named   0 (target: none)",
