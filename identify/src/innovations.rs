@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! 1. put the samples on their grid; mark lost, stale and far samples      prepare, outliers
-//! 2. find the simplest structure that explains the record                 choose, search
+//! 2. find the simplest structure that explains the record         chosen, choose, search
 //! 3. fit it to finer rows; mark samples it cannot predict, fit again      refine
 //!    add drag, friction and thrust, if the record asks for them           forces
 //! 4. average the posterior over the intensity of the noise                mixture, laplace
@@ -19,6 +19,7 @@
 
 mod arx;
 mod choose;
+mod chosen;
 #[cfg(test)]
 mod dense;
 mod descent;

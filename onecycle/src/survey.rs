@@ -138,10 +138,8 @@ fn of_loop(
 
 /// The answer where no part tells anything.
 fn none_told(one: &FlightLoop) -> Answer {
-    let verdict =
-        (one.shown.as_ref()).and_then(|shown| shown.identification.outcome.as_ref().err());
     Answer {
-        next: verdict.map_or_else(String::new, |verdict| refused(verdict).1),
+        next: (one.refusal()).map_or_else(String::new, |verdict| refused(verdict).1),
         ..Answer::not_yet(words::none_told(&one.parts))
     }
 }

@@ -221,16 +221,13 @@ pub(super) fn prediction(
         true => (0..whole.len()).filter_map(measured).collect(),
         false => pairs.iter().map(|(value, _)| *value).collect(),
     };
-    let mean = mean(&every);
-    let square: f64 = every.iter().map(|value| (value - mean).powi(2)).sum();
-    let variance = square * count / every.len() as f64;
     let error: f64 = pairs
         .iter()
         .map(|(value, predicted)| (value - predicted).powi(2))
         .sum();
     Some(Prediction {
         horizon_s: ahead as f64 * whole.block_s(),
-        explained: 1.0 - error / variance,
+        explained: 1.0 - error / (count * variance(&every)),
         error_ratio: error / (count * found.ahead_variance),
     })
 }

@@ -142,6 +142,13 @@ impl FlightLoop {
         widths.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(at, _)| at)
     }
 
+    /// Why the first part is refused, where no part tells anything. `None`: one does, or no part can be used.
+    #[must_use]
+    pub fn refusal(&self) -> Option<&Verdict> {
+        let shown = self.shown.as_ref().filter(|_| self.best().is_none())?;
+        shown.identification.outcome.as_ref().err()
+    }
+
     /// What the parts tell, the best one first.
     #[must_use]
     pub fn told(&self) -> Vec<Found> {

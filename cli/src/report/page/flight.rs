@@ -61,13 +61,12 @@ fn id(one: &FlightLoop) -> String {
 
 /// The answer of a loop, with all that is known of why no part of the flight tells anything about it.
 fn answer(one: &FlightLoop) -> Answer {
-    let verdict =
-        (one.shown.as_ref()).and_then(|shown| shown.identification.outcome.as_ref().err());
-    match verdict {
-        Some(verdict) if one.best().is_none() => Answer {
+    let answer = one.answer.clone();
+    match one.refusal() {
+        Some(verdict) => Answer {
             reason: answers::refused(verdict).0,
-            ..one.answer.clone()
+            ..answer
         },
-        _ => one.answer.clone(),
+        None => answer,
     }
 }
