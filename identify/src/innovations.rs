@@ -212,12 +212,21 @@ impl Search<'_> {
         if let Some(verdict) = self.too_little(fitted, blocks, components) {
             return Err(verdict);
         }
+        if validate::is_of_controller(blocks, &fitted.best.found.theta) {
+            return Err(Verdict::OfController);
+        }
+        if self.options.input_late_s.is_none()
+            && let Some(share) = validate::leads(blocks, &fitted.best.found.at)
+        {
+            return Err(Verdict::OutputLeads { share });
+        }
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
         Self::judge_stability(blocks, tests, explained)?;
         let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
-        if is_another && explained < WELL_PREDICTED {
+        let is_left = is_left_to_the_input(tests) && explained < 0.0;
+        if is_left || is_another && explained < WELL_PREDICTED {
             return Err(Verdict::InputLeft {
                 share: tests.input_share,
             });
@@ -322,7 +331,8 @@ impl Search<'_> {
         };
         (self.remarks).extend(fault.filter(|_| fitted.disturbances != Disturbances::Doubted));
         let is_weak = |found: &&Prediction| {
-            found.explained < WELL_PREDICTED && found.error_ratio > EXPECTED_ERROR_RATIO
+            found.explained < 0.0
+                || found.explained < WELL_PREDICTED && !found.is_as_good_as_disturbances_allow()
         };
         if let Some(prediction) = prediction.filter(is_weak) {
             self.remarks.push(Remark::WeakPrediction {
@@ -388,7 +398,7 @@ impl Search<'_> {
 
 /// Whether a prediction is good, and as good as the disturbances allow.
 pub(crate) fn is_as_expected(prediction: &Prediction) -> bool {
-    prediction.explained >= WELL_PREDICTED && prediction.error_ratio <= EXPECTED_ERROR_RATIO
+    prediction.explained >= WELL_PREDICTED && prediction.is_as_good_as_disturbances_allow()
 }
 
 /// Whether the response to a step before the first row begins as one from rest: with dead time or a second lag of at least

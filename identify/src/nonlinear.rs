@@ -8,6 +8,8 @@ pub struct Nonlinear {
     pub drag: Option<f64>,
     /// Dry friction: the input (input unit) that it takes to overcome it.
     pub friction: Option<f64>,
-    /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit).
+    /// Coefficient `c` of a thrust `d + c d^2`, where `d` is the lagged input less [`middle`](Self::middle) (1/input unit).
     pub thrust: Option<f64>,
+    /// Mean input, at which the gain is the slope of the thrust (input unit).
+    pub middle: f64,
 }

@@ -10,6 +10,7 @@ use crate::nonlinear::Nonlinear;
 use crate::posterior::{Estimate, Interval, Posterior, StepIntervals};
 use crate::reading::Reading;
 use crate::remark::Remark;
+use crate::thresholds::EXPECTED_ERROR_RATIO;
 use crate::two_amplitudes::TwoAmplitudes;
 use crate::verdict::Verdict;
 
@@ -391,6 +392,14 @@ pub struct Prediction {
     /// Mean square of the error over the variance that the disturbances and the noise of the model cause: 1 if the
     /// model is right.
     pub error_ratio: f64,
+}
+
+impl Prediction {
+    /// Whether its error is what the disturbances and the noise of the model cause.
+    #[must_use]
+    pub fn is_as_good_as_disturbances_allow(&self) -> bool {
+        self.error_ratio <= EXPECTED_ERROR_RATIO
+    }
 }
 
 /// Row of the fit: the mean over the samples of a block.

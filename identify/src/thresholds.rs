@@ -25,10 +25,11 @@ pub(crate) const LEAST_SAMPLE_S: f64 = 1e-9;
 pub(crate) const COLOURED: f64 = 0.1;
 /// The same. Above: an error of the prediction is the model's fault ([`BEYOND_DOUBT`]). Judgement.
 pub(crate) const STRONGLY_COLOURED: f64 = 0.3;
-/// Share of the innovations that the past input explains, and its F statistic. Above both: `input_left`. Campaign: `any_open.toml`
-/// and `any_closed.toml`, no right recording of 1,800.
+/// Share of the innovations that the past input explains, and its F statistic. Above both: `input_left`, and `not_this_process` where the
+/// mean predicts better. Campaign: `any_open.toml` and `any_closed.toml`, no right recording of 1,800.
 pub(crate) const LEFT: (f64, f64) = (0.02, 3.0);
-/// The same. Above both, with a prediction below [`WELL_PREDICTED`]: `not_this_process`. Campaign: as [`LEFT`].
+/// The same. Above both, with a prediction below [`WELL_PREDICTED`]: `not_this_process`. Campaign: as [`LEFT`]. Of later inputs without
+/// feedback: `clock_offset`. Argument: noise moves the switching of a relay, in a few rows of a hundred.
 pub(crate) const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// F statistic of twenty past inputs in the innovations of a relay test, of 1,200 rows. Above: refused. Argument: chance exceeds it
 /// once in a hundred records.

@@ -103,6 +103,13 @@ pub enum Verdict {
         /// Share of the innovations' variance.
         share: f64,
     },
+    /// Later inputs explain much of what the model did not predict: the input was logged late.
+    OutputLeads {
+        /// Share of the innovations' variance.
+        share: f64,
+    },
+    /// The input follows the output within a sample: what the recording tells is the controller.
+    OfController,
     /// Only a process that oscillates by itself explains the recording, whose input has hardly more than one frequency: it may not
     /// drive the oscillation.
     NotDriven,
@@ -166,11 +173,11 @@ impl Verdict {
             | Self::NotDriven
             | Self::UnstableInForce
             | Self::UnstableProcess { .. } => "not_this_process",
-            Self::NotExcited { .. } | Self::Calm { .. } => "not_excited",
+            Self::NotExcited { .. } | Self::Calm { .. } | Self::OfController => "not_excited",
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
             Self::EdgeOfDomain(_) | Self::AtBound(_) => "edge_of_domain",
-            Self::ClockOffset { .. } => "clock_offset",
+            Self::ClockOffset { .. } | Self::OutputLeads { .. } => "clock_offset",
             Self::AmplitudeDependent(_) => "amplitude_dependent",
             Self::NoController(_) => "no_controller",
         }
@@ -208,6 +215,8 @@ impl fmt::Display for Verdict {
             | Self::Calm { .. }
             | Self::SetPointLeft { .. }
             | Self::NotDriven
+            | Self::OutputLeads { .. }
+            | Self::OfController
             | Self::UnstableInForce
             | Self::UnstableProcess { .. }
             | Self::InputLeft { .. } => self.write_record(f),
@@ -306,6 +315,14 @@ impl Verdict {
                 "not this kind of process: a model of the first two thirds predicts {:.0} % of the variance of the \
                  last third, {horizon_s:.3} s ahead",
                 100.0 * explained.max(0.0)
+            ),
+            Self::OutputLeads { share } => write!(
+                f,
+                "the output moves before the input: later inputs explain {:.0} % of what the model did not predict",
+                100.0 * share
+            ),
+            Self::OfController => f.write_str(
+                "not excited: the input follows the output within a sample, so the recording tells the controller and not the process",
             ),
             Self::NotDriven => f.write_str(
                 "not this kind of process: only a process that oscillates by itself explains the recording, and a relay does not \

@@ -29,12 +29,7 @@ pub struct ParameterFiles {
 
 /// Files for the firmware of a flight. Old and new values stand in comments. `None` for a firmware without a known format.
 pub fn files(flight: &Flight, changes: &[Change]) -> Option<ParameterFiles> {
-    let ending = match flight.firmware.kind {
-        FirmwareKind::Px4 => "params",
-        FirmwareKind::ArduPilot => "param",
-        FirmwareKind::Betaflight => "txt",
-        FirmwareKind::Inav => return None,
-    };
+    let ending = flight.firmware.kind.parameter_ending()?;
     let reversed: Vec<Change> = (changes.iter())
         .map(|change| Change {
             old: change.new,

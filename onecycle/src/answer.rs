@@ -22,6 +22,9 @@ const DRAWS: usize = 24;
 /// Name of the share of the set-point in the proportional term.
 const WEIGHT: &str = "set-point weight b";
 
+/// Name of the time of the measurement filter.
+const FILTER: &str = "filter Tf";
+
 /// What an answer is about.
 pub(crate) struct Subject<'a> {
     pub(crate) file: &'a str,
@@ -150,7 +153,8 @@ impl ToType {
         let half = now.map(|now| between(&now, &goal, subject.share));
         let all = [now, half, Some(goal)];
         Self {
-            gains: in_plant(choice, all).unwrap_or_else(|| parallel(&all, &goal, subject.units)),
+            gains: in_plant(choice, all, subject.units)
+                .unwrap_or_else(|| parallel(&all, &goal, subject.units)),
             half: half.map(Controller::from),
             is_of_firmware: false,
         }
@@ -185,14 +189,14 @@ fn parallel(all: &[Option<Pid>; 3], goal: &Pid, units: &Units) -> Vec<Gain> {
         of("Kp", &units.controller(""), &|pid| pid.kp),
         of("Ki", &units.integral(), &|pid| pid.ki),
         of("Kd", &units.controller(" s"), &|pid| pid.kd),
-        of("filter Tf", "s", &|pid| pid.filter_s),
+        of(FILTER, "s", &|pid| pid.filter_s),
         of(WEIGHT, "", &weight),
     ];
     gains.into_iter().flatten().collect()
 }
 
 /// The gains as a controller of a process control system takes them. `None`: none is named, or it cannot take them.
-fn in_plant(choice: &Controllers, all: [Option<Pid>; 3]) -> Option<Vec<Gain>> {
+fn in_plant(choice: &Controllers, all: [Option<Pid>; 3], units: &Units) -> Option<Vec<Gain>> {
     let (vendor, spans) = choice.plant?;
     let typed = all.map(|pid| vendor.typed(&pid?, &spans).ok());
     let value = |of: usize, name: &str| {
@@ -209,7 +213,12 @@ fn in_plant(choice: &Controllers, all: [Option<Pid>; 3]) -> Option<Vec<Gain>> {
         ];
         Some(gain(of.name, of.unit, values))
     });
-    Some(named.collect())
+    // What belongs to the loop that is shown and is set apart from the gains.
+    let beside = parallel(&all, all[2].as_ref()?, units).into_iter();
+    let is_settable = vendor.law().setpoint_weight.is_none();
+    let beside =
+        beside.filter(|gain| is_settable && [FILTER, WEIGHT].contains(&gain.name.as_str()));
+    Some(named.chain(beside).collect())
 }
 
 fn gain(name: &str, unit: &str, [now, half, full]: [Option<f64>; 3]) -> Gain {
@@ -261,11 +270,24 @@ fn next(of: Advice, subject: &Subject<'_>, is_of_firmware: bool) -> String {
         (None, Advice::Change, Some(of_log)) if is_of_firmware => words::write(
             subject.file,
             &settings(of_log.control_loop()),
-            subject.share,
+            (of_log.parameter_ending(), subject.share),
         ),
-        (None, Advice::Change, _) => words::type_in(subject.share),
-        _ => words::COMPARE.to_owned(),
+        (None, Advice::Change, _) => words::type_in(subject.share) + &action(subject),
+        _ => words::COMPARE.to_owned() + &action(subject),
     }
+}
+
+/// The action of a process control system's controller, which is a setting of its own beside the gains.
+fn action(subject: &Subject<'_>) -> String {
+    let choice = subject.choice;
+    let typed = choice.and_then(|choice| {
+        let (vendor, spans) = choice.plant?;
+        let (design, _) = choice.design()?;
+        let is_set = vendor.has_range_of_measurement();
+        let gains = vendor.typed(&design.controller.pid(), &spans).ok()?;
+        is_set.then(|| gains.first().is_some_and(|gain| gain.value < 0.0))
+    });
+    typed.map_or(String::new(), words::action)
 }
 
 /// Settings that choose a loop.

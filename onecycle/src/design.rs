@@ -4,7 +4,7 @@ use onecycle_design::{Design, Model, Pid};
 
 use crate::error::Error;
 use crate::in_force::InForce;
-use crate::request::DesignRequest;
+use crate::request::{Against, DesignRequest};
 use crate::results::controllers::{Controllers, Source};
 use crate::results::family::{Known, OfOscillation};
 use crate::words::controllers::refusal;
@@ -54,7 +54,12 @@ impl DesignRequest {
     /// # Errors
     /// One sentence: no process agrees with it, or there is no controller.
     pub fn design_for_all(&self, known: Known) -> Result<DesignReport, Error> {
-        let in_force = InForce::of(&self.requirements, None)?;
+        let mut requirements = self.requirements.clone();
+        // Gains that were typed are in the unit of the firmware, those of a file have been converted.
+        if let (Some(rule), Some(Against::Gains(_))) = (known.rule, &requirements.against) {
+            requirements.input_range = requirements.input_range.or(rule.full_output());
+        }
+        let in_force = InForce::of(&requirements, None)?;
         let asked = self.complete(in_force.law(self.requirements.specification()?))?;
         let family = (known.oscillation)
             .family(known.dead_time_share)

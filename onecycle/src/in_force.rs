@@ -100,7 +100,11 @@ fn check_range(vendor: Vendor, recording: &Recording) -> Result<(), Error> {
     if !vendor.counts_output() || (most <= RIPPLE * full && !is_share) {
         return Ok(());
     }
-    let (only, such) = if is_share { ("only ", 1) } else { ("", 100) };
+    let full_scales = [
+        1.0, 100.0, 127.0, 255.0, 1000.0, 1023.0, 4095.0, 32767.0, 65535.0,
+    ];
+    let such = full_scales.into_iter().find(|full| most <= RIPPLE * full);
+    let (only, such) = (if is_share { "only " } else { "" }, such.unwrap_or(most));
     Err(Error::Request(format!(
         "the input {only}reaches {most}, and `vendor={}` takes 0..{full} for its range: give the range of the recorded input, such as `input_range=0..{such}`",
         vendor.name()

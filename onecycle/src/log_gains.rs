@@ -88,6 +88,11 @@ impl LogLoop {
         format!("  {} loop, {firmware}", self.control_loop)
     }
 
+    /// Usual ending of a file with parameters of its firmware.
+    pub(crate) fn parameter_ending(&self) -> Option<&'static str> {
+        self.flight.firmware.kind.parameter_ending()
+    }
+
     /// Which loop it is.
     pub(crate) fn control_loop(&self) -> ControlLoop {
         self.control_loop

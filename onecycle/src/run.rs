@@ -17,6 +17,7 @@ use crate::results::controllers::Controllers;
 use crate::results::flight::Survey;
 use crate::source::{self, LogFile, Source};
 use crate::survey::{self, Manner};
+use crate::words::recording::input_stops;
 use crate::words::units::Units;
 
 /// Shares of the time: of the choice of a part of a flight in the whole, of the identification in a report.
@@ -205,7 +206,7 @@ impl Request {
         let gains = (of_log.as_ref())
             .map(|of_log| of_log.report(&self.write, &recording, &identification, choice.as_ref()))
             .transpose()?;
-        let answer = answer::of(
+        let mut answer = answer::of(
             &identification,
             &answer::Subject {
                 file: &name,
@@ -216,6 +217,9 @@ impl Request {
                 share: self.write.step,
             },
         );
+        if identification.outcome.is_err() && answer.watch.is_none() {
+            answer.watch = input_stops(&recording);
+        }
         Ok(Report {
             name,
             recording,

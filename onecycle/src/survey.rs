@@ -19,7 +19,7 @@ use crate::source::{LogFile, Source};
 use crate::threads::each;
 use crate::words::answer::refused;
 use crate::words::flight as words;
-use crate::words::log::of_firmware;
+use crate::words::log::{loss, of_firmware};
 use crate::words::units::Units;
 
 /// Largest ratio of the ends of the interval of a part's gain.
@@ -49,6 +49,8 @@ pub(crate) fn survey(
         file: source.name(),
         number,
         firmware: String::new(),
+        lost: loss(&file.log.loss),
+        ending: None,
         loops: vec![],
         files: None,
     };
@@ -58,6 +60,7 @@ pub(crate) fn survey(
         return Ok(surveyed);
     };
     surveyed.firmware = of_firmware(&flight.firmware);
+    surveyed.ending = flight.firmware.kind.parameter_ending();
     let complete = flight.loops.iter().filter(|one| one.is_complete());
     let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
     let (all, done) = (loops.len(), AtomicUsize::new(0));

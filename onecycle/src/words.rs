@@ -127,8 +127,12 @@ pub fn sentence(clause: &str) -> String {
     capital(clause.trim_end_matches('.')) + "."
 }
 
-/// With a capital letter at the start.
+/// With a capital letter at the start, unless that is the name of a file, as in `log.csv: ...`.
 pub fn capital(clause: &str) -> String {
+    let first = clause.split_whitespace().next().unwrap_or_default();
+    if first.ends_with(':') && first.contains('.') {
+        return clause.to_owned();
+    }
     let mut letters = clause.chars();
     let first = letters.next().map(|letter| letter.to_ascii_uppercase());
     first.into_iter().chain(letters).collect()

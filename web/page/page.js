@@ -139,7 +139,7 @@ const answerAll = async (of, isSet, again) => {
     if (!loops || of !== file) return;
     if (own) return openLoop(own);
     const first = ["change", "first_gains", "keep"].map((verdict) => loops.find(({ answer }) => answer?.verdict === verdict)).find(Boolean);
-    if (!first) return say("No loop is told by this flight. What to fly stands beside each.");
+    if (!first) return say("No loop is told by this flight: fly a chirp, or 30 s of quick stick movements on each axis.");
     return openLoop(first.name);
   }
   await identify();
@@ -191,7 +191,7 @@ const readNow = async () => {
   signals = answer;
   showSystem();
   say(`${file.name}: ${signals.samples.toLocaleString("en")} samples, ${shown(signals.span_s[1] - signals.span_s[0])} s.`);
-  at("notes").textContent = log ? `Input: ${signals.names[0]}. Output: ${signals.names[1]}.` : signals.notes.map((note) => `${note}.`).join(" ");
+  at("notes").textContent = log ? `Input: ${signals.names[0]}. Output: ${signals.names[1]}.` : signals.notes.map((note) => `${note[0].toUpperCase()}${note.slice(1)}.`).join(" ");
   view = signals.span_s;
   await drawSignals();
 };
@@ -307,16 +307,22 @@ const showSystem = () => {
   at("input-range").placeholder = of ? `0..${of.full_input}` : "";
   at("output-range-label").hidden = !of?.has_range_of_measurement;
 };
+// The range of the recorded input where it is larger than that of the controller: the next one that devices have.
+const recordedRange = (of) => {
+  const most = Math.max(...(thinned?.input ?? []).map((point) => Math.abs(point[1])));
+  return most > 1.05 * of.full_input ? `0..${[1, 100, 127, 255, 1000, 1023, 4095, 32767, 65535].find((full) => most <= 1.05 * full) ?? Math.ceil(most)}` : "";
+};
 for (const id of SYSTEM) at(id).onchange = async () => {
   const of = vendor();
   if (!of?.counts_output) at("input-range").value = "";
+  else if (id === "vendor") at("input-range").value = recordedRange(of);
   if (!of?.has_range_of_measurement) at("output-range").value = "";
   for (const name of SYSTEM) keep(name, at(name).value);
   showSystem();
   if (!wasAnswered) return;
   if (of?.has_range_of_measurement && !at("output-range").value) { say("This controller counts in percent: give the range of its measurement."); return at("output-range").focus(); }
   await pressed;
-  if (!isBusy && !report) identify();
+  if (isBusy) isWanted = true; else if (!report) identify();
 };
 // What to paste or to type in: the lines of the controller, else names and values.
 const toType = () => drawn?.lines ?? (drawn?.named ?? []).map(({ name, unit, full }) => `${name} = ${Number(full.toPrecision(6))} ${unit}`.trim()).join("\n");
@@ -403,12 +409,15 @@ at("save-all-restore").onclick = () => saveAll("restore");
 
 // ---- Identification ------------------------------------------------------------------------------------------------
 
+// Whether a setting was changed during an identification, which is then repeated.
+let isWanted = false;
 const identify = async () => {
   if (isUnread) readSignals();
   await reading;
   hideAfter("result");
   const of = file, asked = settings();
   const answer = await waited("Identifying.", { message: { do: "identify", settings: asked } });
+  if (isWanted) { isWanted = false; return identify(); }
   if (!answer || of !== file) return;
   if (JSON.stringify(asked) !== JSON.stringify(settings())) return say("The settings have changed: press Identify.");
   report = answer;
@@ -420,7 +429,8 @@ at("identify").onclick = identify;
 const unitOf = (key) => /rad_per_s$/.test(key) ? " (rad/s)" : /_s$/.test(key) ? " (s)" : "";
 const showResult = () => {
   const isFound = report.verdict.kind === "identified";
-  say(`${isFound ? "Identified" : "No process identified"} in ${took()}.`);
+  say(`${file.name}: ${isFound ? "identified" : "no process identified"} in ${took()}.`);
+  at("system").hidden = Boolean(log) || !isFound;
   const found = report.process ?? {};
   at("verdict").className = isFound ? "verdict" : "verdict no";
   const answer = report.answer;
@@ -618,6 +628,7 @@ const drawDesign = (of) => {
   const other = against.judged;
   at("named").tBodies[0].replaceChildren(...(of.named ?? []).map((gain) => row([gain.unit ? `${gain.name} (${gain.unit})` : gain.name, ...[gain.now, gain.half, gain.full].map((value) => shown(value))])));
   at("named").hidden = !of.named?.length;
+  at("named").classList.toggle("first-gains", !of.named?.some(({ now }) => now != null));
   at("lines").textContent = of.lines ?? "";
   at("lines").hidden = !of.lines;
   at("copied").textContent = "";
@@ -629,7 +640,7 @@ const drawDesign = (of) => {
   for (const id of ["step", "effort", "load", "nyquist"]) if (!of.is_stable) at(id).replaceChildren(make("p", "The loop is unstable with these gains.", { className: "bad" }));
   if (!of.is_stable) return;
   const band = (rows, low, times) => rows ? times.map(([t], k) => [t, rows[k][low], rows[k][low + 1]]) : [];
-  const responses = [["step", "step", 1, 0, "output", "model"], ["effort", "step", 2, 2, "controller's output", "input"], ["load", "load", 1, 0, "output", "model"]];
+  const responses = [["step", "step", 1, 0, "step of the set-point", "model"], ["effort", "step", 2, 2, "controller's output", "input"], ["load", "load", 1, 0, "step of the load", "model"]];
   for (const [id, from, column, low, y, hue] of responses) {
     const rows = of[from];
     if (!rows) { at(id).replaceChildren(make("p", "The response is too slow to simulate.", { className: "faint" })); continue; }

@@ -1,11 +1,16 @@
 "use strict";
 // Drawings as SVG: curves, bands and marks in a frame with ticks.
 const plots = (() => {
-  const number = (value) => {
+  const number = (value, digits = 4) => {
     if (value === 0) return "0";
     const size = Math.abs(value);
     if (size >= 1e5 || size < 1e-3) return value.toExponential(1).replace("e+", "e").replace("-", "−");
-    return String(Number(value.toPrecision(4))).replace("-", "−");
+    return String(Number(value.toPrecision(digits))).replace("-", "−");
+  };
+  // Ticks and their labels, with as many digits as tell neighbours apart.
+  const labelled = (low, high, count) => {
+    const all = ticks(low, high, count), digits = Math.ceil(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / (all[1] - all[0]))) + 1;
+    return all.map((at) => [at, number(at, Math.min(Math.max(digits || 0, 4), 15))]);
   };
   // Round values in a range, about `count` of them.
   const ticks = (low, high, count) => {
@@ -54,8 +59,8 @@ const plots = (() => {
     const id = `clip-${place.id}`;
     let svg = `<svg viewBox="0 0 ${width} ${height}" width="${width}" height="${height}" role="img" aria-label="${escaped(of.title)}">`;
     svg += `<clipPath id="${id}"><rect x="${left}" y="${top}" width="${w}" height="${h}"/></clipPath>`;
-    for (const at of ticks(...xs, Math.max(2, w / 90))) svg += `<path class="grid" d="M${limit(X(at))} ${top}v${h}"/><text x="${limit(X(at))}" y="${top + h + 15}" text-anchor="middle">${number(at)}</text>`;
-    for (const at of ticks(...ys, Math.max(3, h / 38))) svg += `<path class="grid" d="M${left} ${limit(Y(at))}h${w}"/><text x="${left - 5}" y="${(Y(at) + 4).toFixed(1)}" text-anchor="end">${number(at)}</text>`;
+    for (const [at, label] of labelled(...xs, Math.max(2, w / 90))) svg += `<path class="grid" d="M${limit(X(at))} ${top}v${h}"/><text x="${limit(X(at))}" y="${top + h + 15}" text-anchor="middle">${label}</text>`;
+    for (const [at, label] of labelled(...ys, Math.max(3, h / 38))) svg += `<path class="grid" d="M${left} ${limit(Y(at))}h${w}"/><text x="${left - 5}" y="${(Y(at) + 4).toFixed(1)}" text-anchor="end">${label}</text>`;
     svg += `<text x="${left + w / 2}" y="${height - 4}" text-anchor="middle">${escaped(of.x)}</text>`;
     svg += `<text transform="translate(11 ${top + h / 2}) rotate(-90)" text-anchor="middle">${escaped(of.y)}</text>`;
     svg += `<g clip-path="url(#${id})">`;

@@ -154,10 +154,18 @@ fn shown<T>(has_now: bool, values: [T; 3]) -> impl Iterator<Item = T> {
 }
 
 fn row(text: &mut String, name: &str, values: impl Iterator<Item = String>, unit: &str) {
-    let values: String = values.map(|value| format!(" {value:>VALUE$}")).collect();
-    let names = NAME.min(width() - 3 * (VALUE + 1) - 2);
+    let values: Vec<String> = values.collect();
+    // Two blanks between columns where there is room.
+    let has_room = values.len() > 1 && width() > NAME + 3 * (VALUE + 2) + 2;
+    let (of_value, of_name) = match has_room {
+        true => (VALUE + 1, NAME),
+        false => (VALUE, NAME.min(width() - 3 * (VALUE + 1) - 2)),
+    };
+    let values: String = (values.iter())
+        .map(|value| format!(" {value:>of_value$}"))
+        .collect();
     let line = |name: &str, unit: &str| {
-        let line = format!("  {name:<names$}{values}  {unit}");
+        let line = format!("  {name:<of_name$}{values}  {unit}");
         line.trim_end().to_owned()
     };
     let mut shown = line(name, unit);

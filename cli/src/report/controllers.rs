@@ -224,7 +224,7 @@ fn typed(vendor: Vendor, gains: &[TypedGain; 3], spans: &Spans) -> String {
         };
         return match vendor.counts_output() {
             true => format!(
-                "{lines}; full output is {} in the recording{reversed}",
+                "{lines}; full output is {} in the unit of the input{reversed}",
                 significant(spans.output)
             ),
             false => format!("{lines}{reversed}"),

@@ -73,8 +73,8 @@ pub(super) fn next(of: &Survey) -> String {
     let is_told = of.loops.iter().any(|one| one.best().is_some());
     match (&of.files, step(of)) {
         (Some(files), _) => answers::written(files),
-        _ if !is_told => words::NO_LOOP.to_owned(),
-        (None, Some(step)) => answers::write(&of.file, "", step),
+        _ if !is_told => words::no_loop(of.lost.as_deref()),
+        (None, Some(step)) => answers::write(&of.file, "", (of.ending, step)),
         (None, None) => answers::NOTHING.to_owned(),
     }
 }

@@ -104,9 +104,6 @@ pub(crate) fn identification(
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
             wrapped(&mut text, "  ", &advice(verdict));
-            if let Some(stops) = recording::input_stops(recording) {
-                wrapped(&mut text, "  ", &stops);
-            }
         }
     }
     describe_remarks(&mut text, found);

@@ -138,7 +138,7 @@ fn a_long_simulation_reads_back_unbiased() {
         "--k", "1", "--t-prop", "0.0321", "--t-body", "1.6886", "--tau", "0.0237",
     ];
     let duration = ["--sample-rate", "1000", "--duration", "4200"];
-    let report = identify(simulate(&process, &duration), &[]).identified();
+    let report = identify(simulate(&process, &duration), &["--cycles", "20"]).identified();
     report.near("k_over_t_body", HOVER_K_OVER_T_BODY, 1e-3);
     report.near("tau_s", HOVER_TAU_S, 0.01);
 }

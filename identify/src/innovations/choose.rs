@@ -49,6 +49,8 @@ const DERIVED: f64 = 0.95;
 #[derive(Clone)]
 pub(super) struct Choice {
     pub(super) candidates: Vec<Candidate>,
+    /// The best fit of each structure, those that a record does not tell from another one too.
+    all: Vec<Candidate>,
     /// Samples a row.
     pub(super) samples: usize,
 }
@@ -61,7 +63,7 @@ impl Choice {
             .filter(|candidate| candidate.bic <= best + EQUAL)
             .min_by_key(|candidate| simplicity(candidate.structure()))?;
         let simplest = self.real(simplest).unwrap_or(simplest);
-        let damped = self.damped(simplest.structure()).filter(|damped| {
+        let damped = damped(&self.candidates, simplest.structure()).filter(|damped| {
             let gain = damped.found.at.log_likelihood - simplest.found.at.log_likelihood;
             2.0 * gain > SHOWN && damped.found.theta.process(1.0).pole_per_s() > 0.0
         });
@@ -97,17 +99,21 @@ impl Choice {
         })
     }
 
-    /// Fit of the structure that has the damping which `structure` lacks.
-    pub(super) fn damped(&self, structure: Structure) -> Option<&Candidate> {
-        let damped = match structure {
-            Structure::DoubleIntegratorLag => Structure::Soiptd,
-            Structure::IntegratorLag => Structure::Soptd,
-            Structure::Iptd => Structure::Foptd,
-            _ => return None,
-        };
-        let mut of_damped = self.candidates.iter();
-        of_damped.find(|candidate| candidate.structure() == damped)
+    /// Fit of the structure that has the damping which `structure` lacks, told or not.
+    pub(super) fn wider(&self, structure: Structure) -> Option<&Candidate> {
+        damped(&self.all, structure)
     }
+}
+
+/// Fit of the structure that has the damping which `structure` lacks.
+fn damped(candidates: &[Candidate], structure: Structure) -> Option<&Candidate> {
+    let damped = match structure {
+        Structure::DoubleIntegratorLag => Structure::Soiptd,
+        Structure::IntegratorLag => Structure::Soptd,
+        Structure::Iptd => Structure::Foptd,
+        _ => return None,
+    };
+    (candidates.iter()).find(|candidate| candidate.structure() == damped)
 }
 
 /// Rank of a structure: number of unknowns; of two with equal numbers the one with real lags is simpler.
@@ -153,9 +159,11 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
     part(RACED..DERIVED, || derive(&blocks, &mut all, limits));
     lift(&blocks, &mut all, limits);
     quieten(&blocks, &mut all, limits);
+    all.retain(|candidate| (limits.structure).is_none_or(|asked| asked == candidate.structure()));
+    let mut candidates = all.clone();
     if limits.structure.is_none() {
         let are_longer = limits.fewest_samples > 1;
-        all.retain(|candidate| {
+        candidates.retain(|candidate| {
             let theta = &candidate.found.theta;
             let bounds = Bounds::new(theta.structure, &blocks, tau_s);
             let is_hidden = has_hidden_lag(theta, record.dt_s)
@@ -166,9 +174,9 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
             !is_hidden && !is_of_a_force(theta, limits.slowest_s)
         });
     }
-    keep_best_of_each(&mut all, limits.structure);
     Choice {
-        candidates: all,
+        candidates: best_of_each(candidates),
+        all: best_of_each(all),
         samples,
     }
 }
@@ -332,8 +340,7 @@ fn is_of_a_force(theta: &Theta, slowest_s: f64) -> bool {
     is_integrating && theta.delay_and_lag_s().1 > 3.0 * slowest_s
 }
 
-fn keep_best_of_each(all: &mut Vec<Candidate>, structure: Option<Structure>) {
-    all.retain(|candidate| structure.is_none_or(|asked| asked == candidate.structure()));
+fn best_of_each(mut all: Vec<Candidate>) -> Vec<Candidate> {
     all.sort_by(|a, b| a.bic.total_cmp(&b.bic));
     let mut seen: Vec<Structure> = Vec::new();
     all.retain(|candidate| {
@@ -341,4 +348,5 @@ fn keep_best_of_each(all: &mut Vec<Candidate>, structure: Option<Structure>) {
         seen.push(candidate.structure());
         is_new
     });
+    all
 }

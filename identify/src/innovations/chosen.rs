@@ -200,9 +200,9 @@ fn choose_on(
     choice.chosen().is_some().then_some(choice)
 }
 
-/// The parts of a long record that choose the structure: that with the largest changes of the input, and that with the
-/// largest curvature of the output. The rows of a longer part would be longer than the lags. In a chirp the first part has
-/// the highest frequencies, to which the process hardly answers.
+/// The parts of a long record that choose the structure: all of it for slow lags, that with the largest curvature of the output, and
+/// that with the largest changes of the input for fast ones, since the rows of a longer part would be longer than they are. In a
+/// chirp the last one has the highest frequencies, to which the process hardly answers.
 fn excited_parts(record: &Record) -> Vec<Range<usize>> {
     if record.len() <= CHOOSING {
         return std::iter::once(0..record.len()).collect();
@@ -226,6 +226,7 @@ fn excited_parts(record: &Record) -> Vec<Range<usize>> {
     };
     let mut parts: Vec<Range<usize>> = largest(&of_input).into_iter().collect();
     parts.extend(largest(&of_output).filter(|part| !parts.contains(part)));
+    parts.push(0..record.len());
     parts
 }
 

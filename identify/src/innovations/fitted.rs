@@ -107,7 +107,10 @@ impl Fitted {
             }
         }
         let blocks = Blocks::new(&record, samples, limits.skip_s);
-        let wider = damped(&blocks, &choice, &best, longest);
+        // Not one that explains less: its limit is the best fit, so it is in another basin.
+        let wider = (choice.wider(best.structure()))
+            .and_then(|wider| search::fit(&blocks, &wider.found.theta, longest))
+            .filter(|wider| wider.log_likelihood() > best.log_likelihood() - NEARLY);
         let mut fitted = Self {
             part,
             choice,
@@ -235,22 +238,6 @@ impl Fitted {
             filter,
         }
     }
-}
-
-/// The fit of the structure that has the damping which that of `best` lacks, its limit: a fit of it that explains less is in another
-/// basin.
-fn damped(
-    blocks: &Blocks<'_>,
-    choice: &Choice,
-    best: &Candidate,
-    longest_tau_s: f64,
-) -> Option<Candidate> {
-    let damped = choice.damped(best.structure())?;
-    let starts = search::derive(&best.found.theta, damped.structure(), blocks.record.dt_s);
-    let starts = starts.into_iter().chain([damped.found.theta]);
-    let fits = starts.filter_map(|theta| search::fit(blocks, &theta, longest_tau_s));
-    fits.filter(|fit| fit.log_likelihood() > best.log_likelihood() - NEARLY)
-        .max_by(|a, b| a.log_likelihood().total_cmp(&b.log_likelihood()))
 }
 
 /// Samples a row that make the innovations white, where rows of `samples` samples leave them coloured: noise that passed a

@@ -46,7 +46,8 @@ impl Asked {
     /// These forces along `record`.
     pub(super) fn of(&self, record: &Record) -> Forces {
         let mut forces = Forces {
-            thrust: self.forces.contains(&Force::Thrust),
+            thrust: (self.forces.contains(&Force::Thrust))
+                .then(|| record.input.iter().sum::<f64>() / record.len() as f64),
             ..Forces::default()
         };
         if self.forces.iter().all(|force| *force == Force::Thrust) {
@@ -116,7 +117,8 @@ pub(super) fn nonlinear(found: &Found, forces: &Forces) -> Nonlinear {
     Nonlinear {
         drag: next(!forces.drag.is_empty()).map(|value| -value),
         friction: next(!forces.friction.is_empty()).map(|value| -value / gain.abs()),
-        thrust: next(forces.thrust).map(|value| value / gain),
+        thrust: next(forces.thrust.is_some()).map(|value| value / gain),
+        middle: forces.thrust.unwrap_or(0.0),
     }
 }
 

@@ -60,8 +60,9 @@ pub(crate) struct Forces {
     pub(crate) drag: Vec<f64>,
     /// Sign of the rate of the output at each sample, smoothed near zero: dry friction. Empty for none.
     pub(crate) friction: Vec<f64>,
-    /// Whether the force has a part that is quadratic in the lagged input: thrust over rotor speed.
-    pub(crate) thrust: bool,
+    /// Input about which the force has a part that is quadratic in the lagged input: thrust over rotor speed. The gain is that at this
+    /// input.
+    pub(crate) thrust: Option<f64>,
 }
 
 impl Forces {
@@ -73,7 +74,7 @@ impl Forces {
 
     /// Number of coefficients, those of the rate first.
     pub(crate) fn len(&self) -> usize {
-        self.of_rate().count() + usize::from(self.thrust)
+        self.of_rate().count() + usize::from(self.thrust.is_some())
     }
 }
 

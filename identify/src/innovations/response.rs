@@ -82,7 +82,7 @@ pub(super) fn of_forces<const N: usize>(
     };
     let mut sums = Vec::with_capacity(record.forces.len());
     sums.extend(record.forces.of_rate().map(of_force));
-    if record.forces.thrust {
+    if let Some(middle) = record.forces.thrust {
         let lag = StateSpace::<2>::new(
             &Linear::new(Structure::Foptd)
                 .with_gain(1.0)
@@ -90,7 +90,7 @@ pub(super) fn of_forces<const N: usize>(
         );
         let lagged = with_input(record, tau_s, |source| outputs(&lag, record, source));
         // The square at rest is a constant, which the disturbance holds.
-        let rest = record.rest.unwrap_or(0.0);
+        let rest = record.rest.unwrap_or(0.0) - middle;
         let squares: Vec<f64> = (lagged.iter())
             .map(|lagged| (rest + lagged / lag_s).powi(2) - rest * rest)
             .collect();

@@ -184,11 +184,16 @@ impl Theta {
     /// Shortest time constant of the process (s): the least of its lags and of the inverses of its poles. Infinite without
     /// any.
     pub(super) fn shortest_lag_s(&self) -> f64 {
+        self.lags_s().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Lags and inverses of the poles (s), without integrators.
+    pub(super) fn lags_s(&self) -> impl Iterator<Item = f64> {
         let layout = self.layout();
         let lags = (0..layout.stages.lags).map(|lag| self.values[lag].exp());
         let pole = layout.pole().map(|pole| 1.0 / self.values[pole].abs());
         let pair = (layout.pair()).map(|pair| 1.0 / self.values[pair + 1].abs().sqrt());
-        lags.chain(pole).chain(pair).fold(f64::INFINITY, f64::min)
+        lags.chain(pole).chain(pair)
     }
 }
 

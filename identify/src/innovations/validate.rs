@@ -12,7 +12,7 @@ use super::search;
 use super::theta::Theta;
 use crate::outcome::{InnovationTests, Prediction};
 use crate::signals::range;
-use crate::thresholds::{CALM_END, COLOURED, FED_BACK, LEFT};
+use crate::thresholds::{ANOTHER_KIND, CALM_END, COLOURED, FED_BACK, LEFT};
 
 /// Lags of the tests.
 const LAGS: usize = 20;
@@ -62,6 +62,48 @@ pub(super) fn tests_above(floor: f64, blocks: &Blocks<'_>, at: &Evaluation) -> I
         input_f,
         rows: count,
     }
+}
+
+/// Whether what was found under feedback is the controller, read backwards: it has neither a dead time nor a lag of a sample.
+pub(super) fn is_of_controller(blocks: &Blocks<'_>, theta: &Theta) -> bool {
+    let all_s: f64 = theta.lags_s().sum::<f64>() + theta.tau_s().max(0.0);
+    let comes_to_rest = theta.structure.stages().integrators == 0;
+    comes_to_rest && all_s < blocks.record.dt_s && is_fed_back(blocks)
+}
+
+/// Share of the innovations that later inputs explain beyond earlier ones, where chance does not: the input was logged late. Under feedback
+/// they do in any case, and tell nothing.
+pub(super) fn leads(blocks: &Blocks<'_>, at: &Evaluation) -> Option<f64> {
+    /// Later blocks.
+    const LEADS: usize = 4;
+    let inputs = blocks.mean_inputs();
+    let whole = LAGS..blocks.len().saturating_sub(LEADS);
+    let rows = (0..blocks.len()).filter(|block| blocks.present(*block) > 0);
+    let used: Vec<(usize, f64)> = (rows.zip(at.innovations()))
+        .filter(|(row, _)| whole.contains(row))
+        .collect();
+    let count = used.len() as f64;
+    if count < 4.0 * LAGS as f64 || follows(blocks) {
+        return None;
+    }
+    let target = centred(used.iter().map(|(_, e)| *e));
+    let column = |place: usize| centred(used.iter().map(|(row, _)| inputs[row + place - LAGS]));
+    // Those of the same block are earlier ones: an input that switched between two samples is logged with the later one.
+    let mut columns: Vec<Vec<f64>> = (1..=LAGS).map(column).collect();
+    let earlier = Orthogonal::independent(&columns);
+    columns.extend((LAGS + 1..=LAGS + LEADS).map(column));
+    let all = Orthogonal::independent(&columns);
+    let (before, after) = (earlier.left(&target), all.left(&target));
+    let (more, freedom) = (
+        (all.len() - earlier.len()) as f64,
+        count - all.len() as f64 - 1.0,
+    );
+    let least = blocks.record.floor.powi(2) / at.variance * count;
+    let (share, f) = (
+        1.0 - after / before,
+        (before - after) / more / (after.max(least) / freedom),
+    );
+    (share > ANOTHER_KIND.0 && f > ANOTHER_KIND.1).then_some(share)
 }
 
 /// Share of the innovations that the input of the blocks before explains, and its F statistic. The input of the same
@@ -126,9 +168,11 @@ pub(super) fn order_of_excitation(blocks: &Blocks<'_>, least: f64) -> usize {
 /// beyond what past inputs do.
 /// Reference: C. W. J. Granger, Econometrica 37 (1969).
 pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
-    if switches(&blocks.record.input) {
-        return true;
-    }
+    switches(&blocks.record.input) || follows(blocks)
+}
+
+/// Whether past outputs explain the input beyond what past inputs do.
+fn follows(blocks: &Blocks<'_>) -> bool {
     let inputs = blocks.mean_inputs();
     let outputs: Vec<f64> = (0..blocks.len())
         .map(|block| blocks.mean_output(block).unwrap_or(0.0))

@@ -220,3 +220,58 @@ fn a_sample_period_below_a_nanosecond_is_refused() {
     let found = test.identify(&Options::default());
     assert_eq!(found.outcome.unwrap_err(), Verdict::Units);
 }
+
+// 60,000 rows of steps 5,000 apart: a part of 20,000 hardly holds one response of a process this slow, all of it does.
+#[test]
+fn a_slow_process_in_a_long_fast_log_is_answered() {
+    let process = [2.0, 2860.0, 300.0, 670.0];
+    let sizes = [10.0, -15.0, 12.0, -18.0, 20.0, -9.0, 14.0, -20.0, 8.0, 6.0];
+    let steps: Vec<(f64, f64)> = (sizes.iter().zip(1..))
+        .map(|(size, number)| (5000.0 * f64::from(number), *size))
+        .collect();
+    let found = Test::of_process(process, &steps, 60_000).identify(&Options::default());
+    let model = found.outcome.expect("identified").model;
+    let of = |parameter| model.parameter(parameter).unwrap();
+    for (parameter, value) in [
+        (Parameter::K, 2.0),
+        (Parameter::TBody, 2860.0),
+        (Parameter::Tau, 670.0),
+    ] {
+        assert!(
+            (of(parameter) / value - 1.0).abs() < 0.01,
+            "{parameter:?} {}",
+            of(parameter)
+        );
+    }
+}
+
+// Two sines of load on a process under a P controller: the input is the output times -0.4 in the same row, whatever the process is.
+#[test]
+fn a_controller_is_not_taken_for_the_process() {
+    let (mut level, mut input, mut output) = (0.0, vec![], vec![]);
+    let mut random = Pcg64Mcg::seed_from_u64(2);
+    for k in 0_i32..900 {
+        let time_s = f64::from(k);
+        let measured = level + random.random_range(-0.02..0.02);
+        output.push(measured);
+        input.push(-0.4 * measured);
+        let load = (0.031 * time_s).sin() + 0.6 * (0.087 * time_s).sin();
+        let acting: f64 = input[(k - 4).max(0) as usize];
+        level += (1.2 * (acting + load) - level) / 22.0;
+    }
+    let time_s: Vec<f64> = (0..900).map(f64::from).collect();
+    let found = Test {
+        time_s,
+        input,
+        output,
+    }
+    .identify(&Options::default());
+    let verdict = found.outcome.err();
+    assert!(
+        matches!(
+            verdict,
+            Some(Verdict::OutputLeads { .. } | Verdict::OfController)
+        ),
+        "{verdict:?}"
+    );
+}

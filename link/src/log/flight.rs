@@ -17,6 +17,19 @@ pub enum FirmwareKind {
     Inav,
 }
 
+impl FirmwareKind {
+    /// Usual ending of a file with parameters, which ground stations look for. `None` for a firmware without a known format.
+    #[must_use]
+    pub fn parameter_ending(self) -> Option<&'static str> {
+        match self {
+            Self::Px4 => Some("params"),
+            Self::ArduPilot => Some("param"),
+            Self::Betaflight => Some("txt"),
+            Self::Inav => None,
+        }
+    }
+}
+
 /// Firmware and board.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]

@@ -66,6 +66,12 @@ impl Rule {
         Self::ALL.into_iter().find(|rule| rule.name() == name)
     }
 
+    /// Full output in the unit of the gains that this rule of a firmware prints; `None` of a rule of books.
+    #[must_use]
+    pub fn full_output(self) -> Option<f64> {
+        matches!(self, Self::Marlin | Self::MarlinBed | Self::Klipper).then_some(255.0)
+    }
+
     /// Its formula.
     #[must_use]
     pub fn formula(self) -> UltimateRule {

@@ -44,6 +44,10 @@ pub struct Survey {
     pub number: usize,
     /// Empty if the file has no such flight.
     pub firmware: String,
+    /// What the file has lost. `None`: nothing.
+    pub lost: Option<String>,
+    /// Usual ending of a file with its parameters. `None`: it has no known format.
+    pub ending: Option<&'static str>,
     /// The loops that are logged.
     pub loops: Vec<FlightLoop>,
     /// The files with the parameters of all loops and with the old values. `None`: not asked for, or there is nothing to write.

@@ -144,6 +144,9 @@ pub fn first(choice: &Controllers) -> String {
     })
 }
 
+/// Ratio of two widths in percent from which each is said.
+const ALIKE: f64 = 1.5;
+
 /// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
 pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
     let width = |low: f64, estimate: f64, high: f64| (high - low) / (2.0 * estimate.abs());
@@ -154,15 +157,20 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
         let [low, estimate, high] = [gain.low?, gain.estimate?, gain.high?];
         Some(width(low, estimate, high))
     });
-    let best = rate
-        .into_iter()
-        .chain(steady)
-        .filter(|width| width.is_finite());
-    let gain = best
-        .min_by(f64::total_cmp)
-        .map_or("the gain has no upper end".to_owned(), |width| {
-            format!("gain known to {} %", (100.0 * width).ceil().max(1.0))
-        });
+    let percent = |width: f64| (100.0 * width).ceil().max(1.0);
+    let finite = |width: Option<f64>| width.filter(|width| width.is_finite()).map(percent);
+    // An integrator has one of the two only: both are the same number there.
+    let gain = match (finite(rate), finite(steady)) {
+        (Some(rate), Some(steady)) if rate.max(steady) > ALIKE * rate.min(steady) => {
+            format!("gain at rest known to {steady} %, first slope to {rate} %")
+        }
+        (Some(rate), None) if identified.estimate.get(Parameter::KOverTBody).is_some() => {
+            format!("first slope known to {rate} %, gain at rest not")
+        }
+        (Some(known), Some(other)) => format!("gain known to {} %", known.max(other)),
+        (Some(known), None) | (None, Some(known)) => format!("gain known to {known} %"),
+        (None, None) => "the gain has no upper end".to_owned(),
+    };
     let prediction = (identified.fit.innovations()).and_then(|of| of.prediction.as_ref());
     let misfit = short(100.0 * identified.fit.misfit);
     let model = match (explained, prediction) {
@@ -170,10 +178,18 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
         (_, Some(of)) if of.explained < 0.0 => {
             "it does not predict the last third of the recording".to_owned()
         }
-        (_, Some(of)) => format!(
-            "it predicts {:.0} % of the last third",
-            100.0 * of.explained
-        ),
+        (_, Some(of)) => {
+            let is_low = of.explained < 0.9 && of.is_as_good_as_disturbances_allow();
+            let rest = if is_low {
+                ", the rest is disturbances and noise"
+            } else {
+                ""
+            };
+            format!(
+                "it predicts {:.0} % of the last third{rest}",
+                100.0 * of.explained
+            )
+        }
         _ if identified.fit.misfit < 5e-4 => "no misfit beyond the noise".to_owned(),
         _ => format!("{misfit} % of the output is left unexplained"),
     };
@@ -182,7 +198,9 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
 
 /// Why there is nothing to type in, and what to do.
 pub fn refused(of: &crate::Verdict) -> (String, String) {
-    (of.to_string(), advice(of).into_owned())
+    let reason = of.to_string();
+    let reason = reason.strip_prefix("no information: ").unwrap_or(&reason);
+    (reason.to_owned(), advice(of).into_owned())
 }
 
 /// Why nothing is proposed where the signals contradict the gains of the log, and what to do.
@@ -219,10 +237,11 @@ pub fn written(files: &NamedFiles) -> String {
     )
 }
 
-/// How to write parameters.
-pub fn write(file: &str, options: &str, share: f64) -> String {
+/// How to write parameters into a file with the ending that the firmware's tools look for.
+pub fn write(file: &str, options: &str, (ending, share): (Option<&str>, f64)) -> String {
     format!(
-        "`identify {file}`{options} `write=tune.txt` writes {} of the step, and a file that restores yours.",
+        "`identify {file}`{options} `write=tune.{}` writes {} of the step, and a file that restores yours.",
+        ending.unwrap_or("txt"),
         part(share)
     )
 }
@@ -233,6 +252,12 @@ pub fn type_in(share: f64) -> String {
         "Type in {} of the step, record again, and go on from there.",
         part(share)
     )
+}
+
+/// Whether the output of a controller rises with the measurement: the direct action.
+pub fn action(is_direct: bool) -> String {
+    let action = if is_direct { "direct" } else { "reverse" };
+    format!(" The action of the controller is {action}.")
 }
 
 /// A share of the way to the proposed gains.

@@ -11,8 +11,6 @@ pub const NOTHING_LOGGED: &str =
 pub const NO_PART: &str = "No part of the flight can be used: the vehicle was not armed and in the air for 5 s, or \
                                   the actuator was at its limit.";
 const NO_PART_IN_BRIEF: &str = "no part of the flight can be used";
-pub const NO_LOOP: &str = "Fly a chirp, or 30 s of quick stick movements on each axis. What each part of this flight told: \
-                                  `details`.";
 pub const MORE: &str = "Process, parts and other figures: `details`; one loop: `axis=AXIS`";
 pub const DISAGREE: &str = "The parts disagree by more than their intervals: the process changed in flight (battery, \
                                    throttle, load). Design for the part in which the vehicle has to be stable first.";
@@ -37,6 +35,16 @@ pub fn brief(refusal: &Refusal) -> String {
             clause.split(':').next().unwrap_or_default().to_owned()
         }
     }
+}
+
+/// What to do where no loop is told. `lost`: what the file has lost.
+pub fn no_loop(lost: Option<&str>) -> String {
+    let again = lost.map_or(String::new(), |lost| {
+        format!("The file is damaged ({lost}): copy it from the vehicle again. ")
+    });
+    format!(
+        "{again}Fly a chirp, or 30 s of quick stick movements on each axis. What each part of this flight told: `details`."
+    )
 }
 
 /// Why no part of a flight tells anything about a loop.

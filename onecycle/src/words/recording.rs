@@ -41,10 +41,13 @@ pub fn note(note: &Note) -> String {
 /// Share of a recording after the last change of the input from which the test has stopped early.
 const STOPPED: f64 = 0.75;
 
-/// That the input stops to change long before the end of the recording, and what to do. `None` if it does not.
+/// That an input that has switched stops to do so long before the end of the recording, and what to do. `None` if it does not, and of
+/// one step, which is made to be followed by rest.
 pub fn input_stops(recording: &Recording) -> Option<String> {
     let (times_s, input) = (recording.time_s(), recording.input());
-    let last = (1..input.len()).rev().find(|&i| input[i] != input[i - 1])?;
+    let mut changes = (1..input.len()).rev().filter(|&i| input[i] != input[i - 1]);
+    let last = changes.next()?;
+    changes.next()?;
     let (start_s, end_s) = (*times_s.first()?, *times_s.last()?);
     let is_stopped = end_s - times_s[last] > STOPPED * (end_s - start_s);
     is_stopped.then(|| {
@@ -255,7 +258,9 @@ mod tests {
     fn a_test_that_stops_early() {
         let stops = |last: usize| {
             let time_s: Vec<f64> = (0..100_u32).map(f64::from).collect();
-            let input: Vec<f64> = (0..100).map(|i| f64::from(u8::from(i < last))).collect();
+            let input: Vec<f64> = (0..100)
+                .map(|i| f64::from(u8::from(i < last && i + 3 != last)))
+                .collect();
             let output: Vec<f64> = time_s.iter().map(|t| t.sin()).collect();
             input_stops(&Recording::from_samples(&time_s, &input, &output).unwrap())
         };

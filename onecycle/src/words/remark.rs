@@ -207,8 +207,8 @@ fn nonlinear(forces: &Nonlinear) -> String {
         format!("a dry friction that takes an input of {c} to overcome")
     });
     let thrust = forces.thrust.map(|c| {
-        let c = significant(c);
-        format!("a thrust of {c} times the square of the lagged input")
+        let (c, middle) = (significant(c), significant(forces.middle));
+        format!("a thrust of {c} times the square of the lagged input less its mean, {middle}")
     });
     let found: Vec<String> = [drag, friction, thrust].into_iter().flatten().collect();
     let advice = if forces.friction.is_some() {

@@ -25,6 +25,7 @@ pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
         | Verdict::UnstableProcess { .. }
         | Verdict::InputLeft { .. } => of_record(verdict).into(),
         Verdict::SetPointLeft { .. } => of_record(verdict).into(),
+        Verdict::OutputLeads { .. } | Verdict::OfController => of_record(verdict).into(),
         Verdict::NotExcited { .. } | Verdict::Calm { .. } => NOT_EXCITED.into(),
         _ => of_relay(verdict).into(),
     }
@@ -98,6 +99,13 @@ fn of_record(verdict: &Verdict) -> &'static str {
         Verdict::NotDriven => {
             "Excite the process with more frequencies, as a chirp or steps do, which tell a resonance from another cause; or give \
              the structure with `structure` if it is known."
+        }
+        Verdict::OutputLeads { .. } => {
+            "The input was logged late, or it is what a controller makes of the output. Correct a known lateness with `input_late` (0: both \
+             columns come from one clock); in a closed loop move the set-point while you record."
+        }
+        Verdict::OfController => {
+            "Move the set-point, or add steps to the output of the controller, while you record."
         }
         Verdict::UnstableInForce => {
             "Fly quick manoeuvres or a chirp on this axis: noise that goes round the loop can pass for a process."
@@ -264,6 +272,8 @@ mod tests {
             Verdict::InputLeft { share: 0.3 },
             Verdict::UnstableInForce,
             Verdict::NotDriven,
+            Verdict::OutputLeads { share: 0.3 },
+            Verdict::OfController,
             Verdict::UnstableProcess { growth_per_s: 56.0 },
             Verdict::NoController(DesignError::Structure(crate::Structure::Foptd)),
             Verdict::NoController(DesignError::PhaseMargin(2.0)),

@@ -3,6 +3,7 @@
 mod bench;
 mod campaign;
 mod certify;
+mod classify;
 mod dataset;
 mod grid;
 mod pack;
@@ -15,6 +16,7 @@ use clap::{Parser, Subcommand};
 pub(crate) use self::bench::{Answers, Bench, BenchAction, Format, MakeBench, RunBench};
 pub(crate) use self::campaign::Campaign;
 pub(crate) use self::certify::Certify;
+pub(crate) use self::classify::Classify;
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::grid::{Cost, Grid};
 pub(crate) use self::pack::{
@@ -54,6 +56,7 @@ pub(crate) enum Command {
     Reproduce(Reproduce),
     Dataset(Dataset),
     Train(Train),
+    Classify(Classify),
     Pack(Pack),
 }
 

@@ -3,6 +3,7 @@
 pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;
+pub(crate) mod classify;
 mod clock;
 pub(crate) mod dataset;
 pub(crate) mod grid;

@@ -36,6 +36,7 @@ pub fn run() -> ExitCode {
         Command::Reproduce(reproduce) => commands::reproduce::run(reproduce),
         Command::Dataset(dataset) => commands::dataset::run(dataset),
         Command::Train(train) => commands::train::run(train),
+        Command::Classify(classify) => commands::classify::run(classify),
         Command::Pack(pack) => commands::pack::run(pack),
     };
     onecycle_cli::ended(PROGRAM, result)

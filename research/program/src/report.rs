@@ -4,6 +4,7 @@ pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certificate;
 pub(crate) mod classifier;
+pub(crate) mod classify;
 pub(crate) mod dataset;
 pub(crate) mod grid;
 pub(crate) mod identifier;

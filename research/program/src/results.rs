@@ -5,6 +5,7 @@ pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;
 pub(crate) mod classifier;
+pub(crate) mod classify;
 pub(crate) mod dataset;
 pub(crate) mod grid;
 pub(crate) mod identifier;

@@ -9,8 +9,8 @@ use super::classifier::{
     Class, ClassifierError, ClassifierRecipe, Gain, INPUTS, Measured, PickRule, Prepared,
     most_likely,
 };
-use crate::experiments::{SampledCycle, last_steady_cycle};
-use crate::judge::evaluate::Answer;
+use crate::experiments::{SAMPLE_S, SampledCycle, last_steady_cycle};
+use crate::judge::evaluate::{Answer, Feedback};
 use crate::learn::onnx::{self, OnnxError};
 use crate::learn::train::{Loss, Matrix, Network, TrainError};
 use crate::workers::OneThread;
@@ -64,8 +64,21 @@ pub enum PaperNetworkError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPick {
     /// The recording ends before the oscillation is steady.
-    #[error("the oscillation is not steady")]
+    #[error("the oscillation is not steady: the last three cycles of the relay have to be alike")]
     NotSteady,
+    /// The oscillation is faster or slower than that of every class.
+    #[error(
+        "its period of {period_s:.3} s is outside that of the classes, {shortest_s:.3} to {longest_s:.3} s: train a network for its \
+         space (onecycle-lab train)"
+    )]
+    Period {
+        /// Period of the recording (s).
+        period_s: f64,
+        /// Shortest period of a class (s).
+        shortest_s: f64,
+        /// Longest period of a class (s), as long as a bias may make it.
+        longest_s: f64,
+    },
     /// The cycle has no harmonics: a signal is constant.
     #[error("the cycle has no harmonics")]
     NoHarmonics,
@@ -76,6 +89,26 @@ pub enum NoPick {
     #[error("{0}")]
     Process(#[from] SoiptdError),
 }
+
+/// What a classifier says of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pick {
+    /// Number of the class.
+    pub class: usize,
+    /// Process and controller, in the units of the recording.
+    pub answer: Answer,
+    /// Period of the recording (s).
+    pub period_s: f64,
+    /// Period of the class under the relay of the network's space, without bias (s).
+    pub class_period_s: f64,
+}
+
+/// End of a recording that is looked at (s): more than any network's fourteen periods.
+const END_S: f64 = 60.0;
+/// Factor by which a bias that is not trimmed may lengthen the period.
+const LENGTHENED: f64 = 3.0;
+/// Factor of the shortest period for noise that switches the relay early.
+const SHORTENED: f64 = 0.8;
 
 /// A trained classifier. See the [module](self).
 #[derive(Clone, Debug)]
@@ -119,29 +152,113 @@ impl PaperNetwork {
         })
     }
 
-    /// The most likely class of the last steady cycle, at the gain that the cycle gives it: a process and its controller.
+    /// The most likely class of the last steady cycle of a relay of amplitude one, sampled as the network has learnt, at the gain
+    /// that the cycle gives it: a process and its controller.
     ///
     /// # Errors
     /// [`NoPick`]: there is no steady cycle, or it has no gain.
     pub fn answer(&self, signals: &Signals<'_>) -> Result<Answer, NoPick> {
         let cycle = last_cycle(signals).ok_or(NoPick::NotSteady)?;
+        Ok(self.pick(&cycle)?.answer)
+    }
+
+    /// As [`Self::answer`], of a relay of any levels at any sample rate, whose period must be one that the classes have.
+    ///
+    /// # Errors
+    /// [`NoPick`]: there is no steady cycle, it is none of the classes', or it has no gain.
+    pub fn answer_to_any(&self, signals: &Signals<'_>) -> Result<Pick, NoPick> {
+        let (trace, amplitude) = normalised(signals).ok_or(NoPick::NotSteady)?;
+        let even = Signals::even(&trace.time_s, &trace.input, &trace.output, SAMPLE_S);
+        let cycle = last_cycle(&even).ok_or(NoPick::NotSteady)?;
+        let period_s = cycle.output.len() as f64 * SAMPLE_S;
+        let periods = self.classes.iter().map(|class| class.period_s);
+        let (shortest_s, longest_s) = periods
+            .fold((f64::INFINITY, 0.0), |(low, high), period_s| {
+                (period_s.min(low), period_s.max(high))
+            });
+        let (shortest_s, longest_s) = (SHORTENED * shortest_s, LENGTHENED * longest_s);
+        if !(shortest_s..=longest_s).contains(&period_s) {
+            return Err(NoPick::Period {
+                period_s,
+                shortest_s,
+                longest_s,
+            });
+        }
+        let mut pick = self.pick(&cycle)?;
+        // An input in amplitudes of the relay: the gain is that much too large, the controller too small.
+        let process = pick
+            .answer
+            .process
+            .map(|of| of.with_gain_scaled(amplitude.recip()));
+        pick.answer.process = process.transpose()?;
+        if let Feedback::Pd(pd) = &mut pick.answer.feedback {
+            pd.kp *= amplitude;
+            pd.kd *= amplitude;
+        }
+        Ok(pick)
+    }
+
+    fn pick(&self, cycle: &SampledCycle) -> Result<Pick, NoPick> {
         let recipe = &self.card.recipe;
         // Nothing measured matches the gain of an unknown process.
         let gain = match recipe.gain {
             Gain::Matched => Gain::DescribingFunction,
             measurable => measurable,
         };
-        let measured = Measured::of(gain, &cycle, recipe.space.beta).ok_or(NoPick::NoHarmonics)?;
+        let measured = Measured::of(gain, cycle, recipe.space.beta).ok_or(NoPick::NoHarmonics)?;
         let mut inputs = Matrix::zeros(1, self.network.inputs());
-        Prepared::of(&cycle, recipe.fit).fill(inputs.row_mut(0));
+        Prepared::of(cycle, recipe.fit).fill(inputs.row_mut(0));
         let outputs = self.network.evaluate(&inputs, &OneThread)?;
-        let class = &self.classes[most_likely(outputs.row(0))];
+        let number = most_likely(outputs.row(0));
+        let class = &self.classes[number];
         let process = class.process.with_gain_scaled(class.gain(&measured))?;
-        Ok(Answer {
-            process: Some(process),
-            ..Answer::of_gains(class.controller(&measured))
+        Ok(Pick {
+            class: number,
+            answer: Answer {
+                process: Some(process),
+                ..Answer::of_gains(class.controller(&measured))
+            },
+            period_s: cycle.output.len() as f64 * cycle.sample_s,
+            class_period_s: class.period_s,
         })
     }
+}
+
+/// The end of a recording at the network's sample rate, from zero, its input between -1 and 1, and the relay's amplitude (input
+/// unit). The input is held between two samples, the output runs straight. `None` of a constant input.
+fn normalised(signals: &Signals<'_>) -> Option<(Trace, f64)> {
+    let time_s = signals.time_s;
+    let end_s = *time_s.last()?;
+    let first = time_s.partition_point(|at_s| *at_s < end_s - END_S);
+    let (time_s, input, output) = (
+        &time_s[first..],
+        &signals.input[first..],
+        &signals.output[first..],
+    );
+    let (low, high) = input
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+            (value.min(low), value.max(high))
+        });
+    let (centre, amplitude) = (0.5 * (high + low), 0.5 * (high - low));
+    if !(amplitude > 0.0) {
+        return None;
+    }
+    let begin_s = *time_s.first()?;
+    let count = ((end_s - begin_s) / SAMPLE_S) as usize;
+    let mut trace = Trace::with_capacity(count);
+    let mut row = 0;
+    for sample in 0..count {
+        let at_s = sample as f64 * SAMPLE_S;
+        while row + 2 < time_s.len() && time_s[row + 1] - begin_s <= at_s {
+            row += 1;
+        }
+        let [before_s, after_s] = [row, row + 1].map(|row| time_s[row] - begin_s);
+        let part = (at_s - before_s) / (after_s - before_s);
+        let y = output[row] + part * (output[row + 1] - output[row]);
+        trace.push(at_s, (input[row] - centre) / amplitude, y, y);
+    }
+    Some((trace, amplitude))
 }
 
 /// The samples of the last steady cycle of a relay of amplitude one.

@@ -110,6 +110,9 @@ pub(crate) struct RunBench {
     /// Methods to run, separated by commas [default: all that read the recordings]
     #[arg(long, value_name = "NAME,...")]
     pub(crate) methods: Option<Methods>,
+    /// Run the paper's classifier of this ONNX file too (made by onecycle-lab train), as the method "classifier"
+    #[arg(long, value_name = "FILE")]
+    pub(crate) network: Option<PathBuf>,
     /// Answers of another program, may be repeated: a CSV file with the columns
     /// experiment,K,T_prop_s,T_body_s,tau_s or experiment,kp,kd; the column seconds is optional
     #[arg(long, value_name = "NAME=FILE")]

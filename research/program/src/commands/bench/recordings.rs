@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use onecycle_cli::failure::Failure;
-use onecycle_link::{CsvOptions, Recording};
+use onecycle_link::Recording;
 
 use super::folder::recording;
+use crate::commands::classify;
 use crate::results::bench::{BenchManifest, RecordingFormat};
 use crate::workers::Workers;
 
@@ -44,15 +45,7 @@ impl Recordings {
     ) -> Result<Vec<Recording>, Failure> {
         match self {
             Self::Csv(folder) => {
-                let read = |index: usize| {
-                    let path = recording(folder, numbers[index]);
-                    onecycle_link::read(&path, &CsvOptions::default()).map_err(|reason| {
-                        Failure::from(onecycle::Error::Recording {
-                            name: path.display().to_string(),
-                            reason: Box::new(reason),
-                        })
-                    })
-                };
+                let read = |index: usize| classify::recording(&recording(folder, numbers[index]));
                 workers.quietly(numbers.len(), read).into_iter().collect()
             }
             // One at a time: threads would share the position in the file.

@@ -9,13 +9,15 @@ use onecycle_cli::failure::{Failure, exit};
 use onecycle_cli::report::json::to_text;
 use onecycle_lab::experiments::Truth;
 use onecycle_lab::judge::evaluate::files::{read_answers, results_csv};
-use onecycle_lab::judge::evaluate::{Contender, Judge, Record, records};
+use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Judge, Record, records};
+use onecycle_lab::paper::network::PaperNetwork;
 use serde_json::{Value, json};
 
 use super::folder::{self, TRUTH, read_text};
 use super::recordings::Recordings;
 use super::traces;
 use crate::args::{self, RunBench};
+use crate::commands::classify;
 use crate::commands::clock::thread_seconds;
 use crate::journal::Journal;
 use crate::output::{print, with_ending, write_file};
@@ -28,19 +30,25 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     let methods = arguments.methods.clone().unwrap_or_default().0;
     let foreign = foreign(&arguments.answers, &truths)?;
     let workers = Workers::new(arguments.threads)?;
-    let recordings = match methods[..] {
-        [] => None,
-        _ => Some(Recordings::open(&arguments.folder, &manifest)?),
+    let network = arguments.network.as_deref().map(classify::network);
+    let network = network.transpose()?;
+    let computes = !methods.is_empty() || network.is_some();
+    let recordings = match computes {
+        false => None,
+        true => Some(Recordings::open(&arguments.folder, &manifest)?),
     };
     if let Some(folder) = &arguments.traces {
         traces::check(folder, &methods)?;
     }
     let out = arguments.out.as_deref();
     let mut done = BTreeMap::new();
-    let mut journal = match out.filter(|_| !methods.is_empty()) {
+    let mut journal = match out.filter(|_| computes) {
         Some(out) => {
             let names: Vec<_> = methods.iter().map(|method| method.name()).collect();
-            let settings = json!({ "benchmark": manifest, "methods": names });
+            let mut settings = json!({ "benchmark": manifest, "methods": names });
+            if let Some(network) = &network {
+                settings["network"] = json!(network.card);
+            }
             Some(opened(out, &settings, arguments.restart, &mut done)?)
         }
         None => None,
@@ -55,7 +63,7 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     if let Some(recordings) = &recordings {
         let ours = answered(
             recordings,
-            &methods,
+            (&methods, network.as_ref()),
             &truths,
             (journal.as_mut(), done),
             &workers,
@@ -107,6 +115,9 @@ fn opened(
     )
 }
 
+/// Name of the paper's classifier among the methods.
+const CLASSIFIER: &str = "classifier";
+
 /// Experiments of each thread between two writes to the journal: few, because a killed run loses them.
 const LOT: usize = 4;
 
@@ -114,7 +125,7 @@ const LOT: usize = 4;
 /// the true processes, for errors.
 fn answered(
     recordings: &Recordings,
-    methods: &[Contender],
+    (methods, network): (&[Contender], Option<&PaperNetwork>),
     truths: &[Truth],
     (mut journal, mut done): (Option<&mut Journal>, BTreeMap<u64, Vec<Record>>),
     workers: &Workers,
@@ -130,7 +141,14 @@ fn answered(
         let read = recordings.read(&numbers, workers)?;
         let made = workers.run(lot.len(), |index| {
             let records = with_signals(&read[index], |signals| {
-                records(lot[index], signals, methods, &thread_seconds)
+                let truth = lot[index];
+                let mut all = records(truth, signals, methods, &thread_seconds)?;
+                if let Some(network) = network {
+                    let answer = || network.answer(signals).map_err(|error| error.to_string());
+                    let judge = Judge::new(&truth.process)?;
+                    all.push(judge.timed(truth.number, CLASSIFIER, answer, &thread_seconds));
+                }
+                Ok::<_, EvaluationError>(all)
             });
             records.map_err(|error| {
                 Failure::unreadable(truth, format!("experiment {}: {error}", numbers[index]))
@@ -153,6 +171,11 @@ fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failu
     let experiments: BTreeSet<u64> = truths.iter().map(|truth| truth.number).collect();
     let mut records = Vec::new();
     for (index, answers) in all.iter().enumerate() {
+        if answers.name == CLASSIFIER {
+            return Err(Failure::usage(format!(
+                "answers cannot be named '{CLASSIFIER}': choose another name"
+            )));
+        }
         if all[..index]
             .iter()
             .any(|before| before.name == answers.name)

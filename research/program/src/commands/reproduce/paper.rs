@@ -8,9 +8,9 @@ use onecycle_lab::paper::network::PaperNetwork;
 
 use super::network::RecipeName;
 use crate::args::Reproduce;
+use crate::commands::classify;
 use crate::commands::train::classifier::make;
 use crate::output::tell;
-use crate::reading::{MOST_OF_A_TABLE, bytes_at_most};
 use crate::workers::Workers;
 
 /// The network that `--network` names, or the one that an earlier run has trained, or a new one.
@@ -20,7 +20,7 @@ pub(super) fn network(
     workers: &Workers,
 ) -> Result<PaperNetwork, Failure> {
     if let Some(path) = &arguments.network {
-        return read(path);
+        return classify::network(path);
     }
     let (recipe, name) = if arguments.quick {
         (RecipeName::Small, "paper_network_quick.onnx")
@@ -36,10 +36,5 @@ pub(super) fn network(
         ));
         make(&recipe, &path, false, workers, Failure::usage)?;
     }
-    read(&path)
-}
-
-fn read(path: &Path) -> Result<PaperNetwork, Failure> {
-    let bytes = bytes_at_most(path, MOST_OF_A_TABLE)?;
-    PaperNetwork::read(&bytes).map_err(|error| Failure::unreadable(path, error))
+    classify::network(&path)
 }
