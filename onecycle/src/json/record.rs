@@ -96,6 +96,7 @@ pub(super) struct Tests {
     drag: Option<f64>,
     friction: Option<f64>,
     thrust: Option<f64>,
+    thrust_about: Option<f64>,
 }
 
 impl From<&Innovations> for Tests {
@@ -110,6 +111,7 @@ impl From<&Innovations> for Tests {
             drag: of.nonlinear.drag,
             friction: of.nonlinear.friction,
             thrust: of.nonlinear.thrust,
+            thrust_about: of.nonlinear.thrust.map(|_| of.nonlinear.middle),
         }
     }
 }

@@ -149,23 +149,28 @@ const ALIKE: f64 = 1.5;
 
 /// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
 pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
-    let width = |low: f64, estimate: f64, high: f64| (high - low) / (2.0 * estimate.abs());
-    let rate = identified
-        .effectiveness()
-        .map(|[low, estimate, high]| width(low, estimate, high));
-    let steady = identified.estimate.get(Parameter::K).and_then(|gain| {
-        let [low, estimate, high] = [gain.low?, gain.estimate?, gain.high?];
-        Some(width(low, estimate, high))
-    });
-    let percent = |width: f64| (100.0 * width).ceil().max(1.0);
-    let finite = |width: Option<f64>| width.filter(|width| width.is_finite()).map(percent);
-    // An integrator has one of the two only: both are the same number there.
-    let gain = match (finite(rate), finite(steady)) {
-        (Some(rate), Some(steady)) if rate.max(steady) > ALIKE * rate.min(steady) => {
-            format!("gain at rest known to {steady} %, first slope to {rate} %")
+    let percent = |[low, estimate, high]: [f64; 3]| {
+        let width = (high - low) / (2.0 * estimate.abs());
+        width.is_finite().then(|| (100.0 * width).ceil().max(1.0))
+    };
+    let of = |parameter| {
+        let of = identified.estimate.get(parameter)?;
+        Some([of.low?, of.estimate?, of.high.unwrap_or(f64::INFINITY)])
+    };
+    let slope = of(Parameter::KOverTBody).or_else(|| identified.effectiveness());
+    let (slope, end) = (slope.and_then(percent), of(Parameter::K).and_then(percent));
+    let is_integrating = identified.model.structure().stages().integrators > 0;
+    let name = if is_integrating {
+        "steady rate"
+    } else {
+        "gain at rest"
+    };
+    let gain = match (slope, end) {
+        (Some(slope), Some(end)) if slope.max(end) > ALIKE * slope.min(end) => {
+            format!("{name} known to {end} %, first slope to {slope} %")
         }
-        (Some(rate), None) if identified.estimate.get(Parameter::KOverTBody).is_some() => {
-            format!("first slope known to {rate} %, gain at rest not")
+        (Some(slope), None) if of(Parameter::KOverTBody).is_some() => {
+            format!("first slope known to {slope} %, {name} not")
         }
         (Some(known), Some(other)) => format!("gain known to {} %", known.max(other)),
         (Some(known), None) | (None, Some(known)) => format!("gain known to {known} %"),

@@ -2,7 +2,7 @@
 
 use onecycle_lab::experiments::{Campaign, IDENTIFICATION_PERIODS};
 use onecycle_lab::experiments::{SAMPLE_S, signals_of};
-use onecycle_lab::judge::evaluate::{Feedback, Judge};
+use onecycle_lab::judge::evaluate::{Answer, Feedback, Judge};
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::train::{Layer, Loss, Network};
 use onecycle_lab::paper::classifier::{ClassifierRecipe, INPUTS, PickRule};
@@ -78,6 +78,29 @@ fn the_class_that_is_picked() {
             .abs()
     });
     assert!(costs[0] < 1e-2 && costs[1] > costs[0], "{costs:?}");
+}
+
+// Levels 3 and 13 in the place of -1 and 1, from 20 s on: a gain a fifth as large, and five times the controller. Stretched by a hundred the
+// period is none of the classes'.
+#[test]
+fn a_relay_of_any_levels() {
+    let (_, trace) = test_of_the_first();
+    let network = PaperNetwork::read(&file(&always(0), &card())).unwrap();
+    let plain = network.answer(&signals_of(&trace, SAMPLE_S)).unwrap();
+    let mut other = trace.clone();
+    other.input.iter_mut().for_each(|u| *u = 8.0 + 5.0 * *u);
+    other.time_s.iter_mut().for_each(|t| *t += 20.0);
+    let pick = network.answer_to_any(&signals_of(&other, SAMPLE_S)).unwrap();
+    let gain = |answer: &Answer| answer.process.unwrap().k_over_t_body();
+    assert!((5.0 * gain(&pick.answer) / gain(&plain) - 1.0).abs() < 1e-3);
+    let (Feedback::Pd(pd), Feedback::Pd(of_plain)) = (pick.answer.feedback, plain.feedback) else {
+        panic!("no PD");
+    };
+    assert!((pd.kp / of_plain.kp / 5.0 - 1.0).abs() < 1e-3);
+    assert!((pick.period_s / pick.class_period_s - 1.0).abs() < 0.02);
+    other.time_s.iter_mut().for_each(|t| *t *= 100.0);
+    let none = network.answer_to_any(&signals_of(&other, 100.0 * SAMPLE_S));
+    assert!(matches!(none, Err(NoPick::Period { .. } | NoPick::NotSteady)), "{none:?}");
 }
 
 #[test]
