@@ -132,6 +132,26 @@ fn the_same_test_by_other_options() {
     assert_eq!(klipper.0["family"]["known"]["rule"], "klipper");
 }
 
+// Gains that a firmware printed are in its unit, and so are those to type into it.
+#[test]
+fn gains_of_a_firmware_stay_in_its_unit() {
+    for (vendor, before) in [("klipper", "pid_kp: "), ("marlin", "M301 P")] {
+        let asked = [
+            "--rule",
+            vendor,
+            "--against",
+            "24,1.2,120",
+            "--vendor",
+            vendor,
+        ];
+        let kp = tune(&asked).number("/controller/kp");
+        let text = run(&[&["tune"], &asked[..]].concat()).stdout;
+        let typed = text.split_once(before).unwrap().1.split([',', ' ']).next();
+        let typed: f64 = typed.unwrap().parse().unwrap();
+        assert!((typed / kp - 1.0).abs() < 1e-4, "{vendor}: {typed} {kp}");
+    }
+}
+
 // The middle and the ends of each parameter; an integrator has no gain at rest. Text and page say what was assumed.
 #[test]
 fn the_family_is_reported() {

@@ -68,7 +68,7 @@ pub(super) fn tests_above(floor: f64, blocks: &Blocks<'_>, at: &Evaluation) -> I
 pub(super) fn is_of_controller(blocks: &Blocks<'_>, theta: &Theta) -> bool {
     let all_s: f64 = theta.lags_s().sum::<f64>() + theta.tau_s().max(0.0);
     let comes_to_rest = theta.structure.stages().integrators == 0;
-    comes_to_rest && all_s < blocks.record.dt_s && is_fed_back(blocks)
+    comes_to_rest && all_s < blocks.record.dt_s && follows(blocks)
 }
 
 /// Share of the innovations that later inputs explain beyond earlier ones, where chance does not: the input was logged late. Under feedback
