@@ -211,15 +211,15 @@ impl fmt::Display for Verdict {
             | Self::NoInformation { .. }
             | Self::AtBound(_)
             | Self::NoPrediction { .. }
-            | Self::NotExcited { .. }
-            | Self::Calm { .. }
             | Self::SetPointLeft { .. }
             | Self::NotDriven
-            | Self::OutputLeads { .. }
-            | Self::OfController
             | Self::UnstableInForce
             | Self::UnstableProcess { .. }
             | Self::InputLeft { .. } => self.write_record(f),
+            Self::NotExcited { .. }
+            | Self::Calm { .. }
+            | Self::OutputLeads { .. }
+            | Self::OfController => self.write_excitation(f),
         }
     }
 }
@@ -316,14 +316,6 @@ impl Verdict {
                  last third, {horizon_s:.3} s ahead",
                 100.0 * explained.max(0.0)
             ),
-            Self::OutputLeads { share } => write!(
-                f,
-                "the output moves before the input: later inputs explain {:.0} % of what the model did not predict",
-                100.0 * share
-            ),
-            Self::OfController => f.write_str(
-                "not excited: the input follows the output within a sample, so the recording tells the controller and not the process",
-            ),
             Self::NotDriven => f.write_str(
                 "not this kind of process: only a process that oscillates by itself explains the recording, and a relay does not \
                  tell such a one from a limit cycle that it does not drive",
@@ -336,16 +328,6 @@ impl Verdict {
                 "unstable without its controller: the output grows by itself with a time constant of {:.3} s",
                 1.0 / growth_per_s
             ),
-            Self::Calm { deviation, least } => write!(
-                f,
-                "not excited: the standard deviation of the output is {deviation:.3}, and less than {least} tells nothing"
-            ),
-            Self::NotExcited { share } => write!(
-                f,
-                "not excited: the set-point explains {:.0} % of the output, and the input follows the rest through the \
-                 controller",
-                100.0 * share
-            ),
             Self::SetPointLeft { ratio } => write!(
                 f,
                 "not this kind of process: no structure explains how the output follows the set-point; the mean square \
@@ -355,6 +337,31 @@ impl Verdict {
                 f,
                 "not this kind of process: more than chance would, the past input explains {:.2} % of what the model did \
                  not predict",
+                100.0 * share
+            ),
+            _ => f.write_str(self.kind()),
+        }
+    }
+
+    /// Clause of a verdict on what moved the input.
+    fn write_excitation(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutputLeads { share } => write!(
+                f,
+                "the output moves before the input: later inputs explain {:.0} % of what the model did not predict",
+                100.0 * share
+            ),
+            Self::OfController => f.write_str(
+                "not excited: the input follows the output within a sample, so the recording tells the controller and not the process",
+            ),
+            Self::Calm { deviation, least } => write!(
+                f,
+                "not excited: the standard deviation of the output is {deviation:.3}, and less than {least} tells nothing"
+            ),
+            Self::NotExcited { share } => write!(
+                f,
+                "not excited: the set-point explains {:.0} % of the output, and the input follows the rest through the \
+                 controller",
                 100.0 * share
             ),
             _ => f.write_str(self.kind()),

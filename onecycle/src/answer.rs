@@ -3,7 +3,7 @@
 use onecycle_design::cascade::Cascade;
 use onecycle_design::{Assessment, Comparison, Controller, Pid, assess};
 use onecycle_identify::{Identification, Identified};
-use onecycle_link::{Agreement, ControlLoop, LoopGains};
+use onecycle_link::{Agreement, ControlLoop, LoopGains, Recording};
 
 use crate::log_gains::{LogLoop, pid};
 use crate::results::answer::{Advice, Answer, Columns, Gain};
@@ -12,6 +12,7 @@ use crate::results::log_gains::LogGains;
 use crate::words::answer as words;
 use crate::words::controllers::advice;
 use crate::words::log_gains::broken;
+use crate::words::recording::input_stops;
 use crate::words::remark::reasons;
 use crate::words::sentence;
 use crate::words::units::Units;
@@ -49,6 +50,18 @@ pub(crate) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
     let answer = of_identified(identified, subject);
     Answer {
         watch: watch.or(answer.watch),
+        ..answer
+    }
+}
+
+/// The answer with what the recording itself shows, where it is refused and nothing else is to be watched.
+pub(crate) fn watching(answer: Answer, found: &Identification, recording: &Recording) -> Answer {
+    let stops = match (&found.outcome, &answer.watch) {
+        (Err(_), None) => input_stops(recording),
+        _ => return answer,
+    };
+    Answer {
+        watch: stops,
         ..answer
     }
 }

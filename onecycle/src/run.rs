@@ -17,7 +17,6 @@ use crate::results::controllers::Controllers;
 use crate::results::flight::Survey;
 use crate::source::{self, LogFile, Source};
 use crate::survey::{self, Manner};
-use crate::words::recording::input_stops;
 use crate::words::units::Units;
 
 /// Shares of the time: of the choice of a part of a flight in the whole, of the identification in a report.
@@ -206,7 +205,7 @@ impl Request {
         let gains = (of_log.as_ref())
             .map(|of_log| of_log.report(&self.write, &recording, &identification, choice.as_ref()))
             .transpose()?;
-        let mut answer = answer::of(
+        let answer = answer::of(
             &identification,
             &answer::Subject {
                 file: &name,
@@ -217,9 +216,7 @@ impl Request {
                 share: self.write.step,
             },
         );
-        if identification.outcome.is_err() && answer.watch.is_none() {
-            answer.watch = input_stops(&recording);
-        }
+        let answer = answer::watching(answer, &identification, &recording);
         Ok(Report {
             name,
             recording,

@@ -566,8 +566,8 @@ def answered(browser, told):
     theirs = program(told.program, "identify", plant, "--json", "--controller", "pi", "--vendor", "deltav", "--output-range", "0..100")
     gains = theirs["answer"]["gains"]
     rows = [row.split("\t") for row in page.inner_text("#named tbody").splitlines()]
-    expect([row[0].split(" ")[0] for row in rows] == [gain["name"] for gain in gains], f"{rows} and {gains}")
-    expect(all(abs(float(row[3]) / gain["full"] - 1) < 2 * CLOSE for row, gain in zip(rows, gains)), f"{rows} and {gains}")
+    expect([row[0].split(" (")[0] for row in rows] == [gain["name"] for gain in gains], f"{rows} and {gains}")
+    expect(all(abs(float(row[-1]) - gain["full"]) <= 2 * CLOSE * abs(gain["full"]) for row, gain in zip(rows, gains)), f"{rows} and {gains}")
     studio.close()
     # On a phone the responses stay in sight while the gains move.
     studio = Studio(browser, told.page, is_automatic=True, viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
@@ -650,8 +650,8 @@ def controllers(browser, told):
         studio.designed()
         gains = theirs["answer"]["gains"]
         rows = [row.split("\t") for row in page.inner_text("#named tbody").splitlines()]
-        expect([row[0].split(" ")[0] for row in rows] == [gain["name"].split(" ")[0] for gain in gains], f"{name}: {rows} and {gains}")
-        expect(all(abs(float(row[3]) / gain["full"] - 1) < 2 * CLOSE for row, gain in zip(rows, gains)), f"{name}: {rows} and {gains}")
+        expect([row[0].split(" (")[0] for row in rows] == [gain["name"] for gain in gains], f"{name}: {rows} and {gains}")
+        expect(all(abs(float(row[-1]) - gain["full"]) <= 2 * CLOSE * abs(gain["full"]) for row, gain in zip(rows, gains)), f"{name}: {rows} and {gains}")
         page.click("#copy")
         studio.until("document.getElementById('copied').textContent === 'Copied.'")
         copied = page.evaluate("navigator.clipboard.readText()")

@@ -144,8 +144,9 @@ pub fn first(choice: &Controllers) -> String {
     })
 }
 
-/// Ratio of two widths in percent from which each is said.
+/// Ratio of two widths from which each is said, and the width (percent) up to which the larger alone is.
 const ALIKE: f64 = 1.5;
+const NARROW: f64 = 5.0;
 
 /// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
 pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
@@ -166,7 +167,7 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
         "gain at rest"
     };
     let gain = match (slope, end) {
-        (Some(slope), Some(end)) if slope.max(end) > ALIKE * slope.min(end) => {
+        (Some(slope), Some(end)) if slope.max(end) > NARROW.max(ALIKE * slope.min(end)) => {
             format!("{name} known to {end} %, first slope to {slope} %")
         }
         (Some(slope), None) if of(Parameter::KOverTBody).is_some() => {

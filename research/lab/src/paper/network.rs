@@ -241,7 +241,7 @@ fn normalised(signals: &Signals<'_>) -> Option<(Trace, f64)> {
             (value.min(low), value.max(high))
         });
     let (centre, amplitude) = (0.5 * (high + low), 0.5 * (high - low));
-    if !(amplitude > 0.0) {
+    if amplitude <= 0.0 {
         return None;
     }
     let begin_s = *time_s.first()?;

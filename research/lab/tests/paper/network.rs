@@ -90,7 +90,9 @@ fn a_relay_of_any_levels() {
     let mut other = trace.clone();
     other.input.iter_mut().for_each(|u| *u = 8.0 + 5.0 * *u);
     other.time_s.iter_mut().for_each(|t| *t += 20.0);
-    let pick = network.answer_to_any(&signals_of(&other, SAMPLE_S)).unwrap();
+    let pick = network
+        .answer_to_any(&signals_of(&other, SAMPLE_S))
+        .unwrap();
     let gain = |answer: &Answer| answer.process.unwrap().k_over_t_body();
     assert!((5.0 * gain(&pick.answer) / gain(&plain) - 1.0).abs() < 1e-3);
     let (Feedback::Pd(pd), Feedback::Pd(of_plain)) = (pick.answer.feedback, plain.feedback) else {
@@ -100,7 +102,10 @@ fn a_relay_of_any_levels() {
     assert!((pick.period_s / pick.class_period_s - 1.0).abs() < 0.02);
     other.time_s.iter_mut().for_each(|t| *t *= 100.0);
     let none = network.answer_to_any(&signals_of(&other, 100.0 * SAMPLE_S));
-    assert!(matches!(none, Err(NoPick::Period { .. } | NoPick::NotSteady)), "{none:?}");
+    assert!(
+        matches!(none, Err(NoPick::Period { .. } | NoPick::NotSteady)),
+        "{none:?}"
+    );
 }
 
 #[test]
