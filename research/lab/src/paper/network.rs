@@ -250,7 +250,8 @@ fn normalised(signals: &Signals<'_>) -> Option<(Trace, f64)> {
     let mut row = 0;
     for sample in 0..count {
         let at_s = sample as f64 * SAMPLE_S;
-        while row + 2 < time_s.len() && time_s[row + 1] - begin_s <= at_s {
+        // Stamps are as exact as their last digits.
+        while row + 2 < time_s.len() && time_s[row + 1] - begin_s <= at_s + 1e-3 * SAMPLE_S {
             row += 1;
         }
         let [before_s, after_s] = [row, row + 1].map(|row| time_s[row] - begin_s);

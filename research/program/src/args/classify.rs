@@ -14,7 +14,8 @@ use clap::Args;
     "Examples:\n",
     "  onecycle-lab train --recipe research/program/reproduction/paper_network_small.toml -o small.onnx\n",
     "  onecycle-lab classify --network small.onnx examples/simulated_hover.csv\n",
-    "  onecycle-lab train --recipe research/program/reproduction/literal.toml -o literal.onnx    (some 50 minutes)\n\n",
+    "  onecycle-lab classify --network small.onnx examples/jsbsim_f450_roll_clean.csv --json\n\n",
+    "The paper's own recipe is research/program/reproduction/literal.toml; it trains for some 50 minutes.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recording or network, 4 no class for a recording"
 ))]
 pub(crate) struct Classify {
