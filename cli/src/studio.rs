@@ -3,7 +3,7 @@
 //! | message | answer |
 //! | --- | --- |
 //! | `{"do":"open"}` | `{log}`: the report of `onecycle log --json`, null for a table |
-//! | `{"do":"signals","settings"}` | `{samples, span_s, names, units, parts, notes}`: the signals of a loop or a table |
+//! | `{"do":"signals","settings"}` | `{samples, span_s, full_scale, names, units, parts, notes}`: the signals of a loop or a table; `full_scale` of devices holds the input |
 //! | `{"do":"view","from_s","to_s","points"}` | `{time_s, input, output, set_point}` of that time, thinned |
 //! | `{"do":"identify","settings"}` | the report of `onecycle identify --json` |
 //! | `{"do":"survey","settings"}` | that of `onecycle identify LOG --json`: every loop of a flight; with `parameters`: files for all to change, or null |
@@ -312,6 +312,7 @@ impl Signals {
     ) -> Self {
         about["samples"] = json!(time_s.len());
         about["span_s"] = json!([time_s.first(), time_s.last()]);
+        about["full_scale"] = json!(onecycle::full_scale(&input));
         about["has_set_point"] = json!(set_point.is_some());
         Self {
             time_s,

@@ -331,8 +331,7 @@ impl Search<'_> {
         };
         (self.remarks).extend(fault.filter(|_| fitted.disturbances != Disturbances::Doubted));
         let is_weak = |found: &&Prediction| {
-            found.explained < 0.0
-                || found.explained < WELL_PREDICTED && !found.is_as_good_as_disturbances_allow()
+            found.explained < 0.0 || !found.is_good() && !found.is_as_good_as_disturbances_allow()
         };
         if let Some(prediction) = prediction.filter(is_weak) {
             self.remarks.push(Remark::WeakPrediction {
@@ -398,7 +397,7 @@ impl Search<'_> {
 
 /// Whether a prediction is good, and as good as the disturbances allow.
 pub(crate) fn is_as_expected(prediction: &Prediction) -> bool {
-    prediction.explained >= WELL_PREDICTED && prediction.is_as_good_as_disturbances_allow()
+    prediction.is_good() && prediction.is_as_good_as_disturbances_allow()
 }
 
 /// Whether the response to a step before the first row begins as one from rest: with dead time or a second lag of at least

@@ -10,7 +10,7 @@ use crate::nonlinear::Nonlinear;
 use crate::posterior::{Estimate, Interval, Posterior, StepIntervals};
 use crate::reading::Reading;
 use crate::remark::Remark;
-use crate::thresholds::EXPECTED_ERROR_RATIO;
+use crate::thresholds::{EXPECTED_ERROR_RATIO, WELL_PREDICTED};
 use crate::two_amplitudes::TwoAmplitudes;
 use crate::verdict::Verdict;
 
@@ -395,6 +395,12 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// Whether it explains nine tenths of the variance.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.explained >= WELL_PREDICTED
+    }
+
     /// Whether its error is what the disturbances and the noise of the model cause.
     #[must_use]
     pub fn is_as_good_as_disturbances_allow(&self) -> bool {

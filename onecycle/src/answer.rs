@@ -10,7 +10,7 @@ use crate::results::answer::{Advice, Answer, Columns, Gain};
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
 use crate::words::answer as words;
-use crate::words::controllers::advice;
+use crate::words::controllers::{action as action_of, advice};
 use crate::words::log_gains::broken;
 use crate::words::recording::input_stops;
 use crate::words::remark::reasons;
@@ -19,12 +19,6 @@ use crate::words::units::Units;
 
 /// Draws on which the gains in force and the proposed ones are compared.
 const DRAWS: usize = 24;
-
-/// Name of the share of the set-point in the proportional term.
-const WEIGHT: &str = "set-point weight b";
-
-/// Name of the time of the measurement filter.
-const FILTER: &str = "filter Tf";
 
 /// What an answer is about.
 pub(crate) struct Subject<'a> {
@@ -38,30 +32,21 @@ pub(crate) struct Subject<'a> {
 }
 
 /// The answer to a recording.
-pub(crate) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
+pub(crate) fn of(found: &Identification, recording: &Recording, subject: &Subject<'_>) -> Answer {
     let identified = match &found.outcome {
         Ok(identified) => identified,
         Err(verdict) => {
             let (reason, next) = words::refused(verdict);
-            return not_yet(reason, next, None);
+            return Answer {
+                watch: input_stops(recording),
+                ..not_yet(reason, next, None)
+            };
         }
     };
     let watch = reasons(found).first().map(|(_, sentence)| sentence.clone());
     let answer = of_identified(identified, subject);
     Answer {
         watch: watch.or(answer.watch),
-        ..answer
-    }
-}
-
-/// The answer with what the recording itself shows, where it is refused and nothing else is to be watched.
-pub(crate) fn watching(answer: Answer, found: &Identification, recording: &Recording) -> Answer {
-    let stops = match (&found.outcome, &answer.watch) {
-        (Err(_), None) => input_stops(recording),
-        _ => return answer,
-    };
-    Answer {
-        watch: stops,
         ..answer
     }
 }
@@ -166,8 +151,7 @@ impl ToType {
         let half = now.map(|now| between(&now, &goal, subject.share));
         let all = [now, half, Some(goal)];
         Self {
-            gains: in_plant(choice, all, subject.units)
-                .unwrap_or_else(|| parallel(&all, &goal, subject.units)),
+            gains: in_plant(choice, all).unwrap_or_else(|| parallel(&all, subject.units)),
             half: half.map(Controller::from),
             is_of_firmware: false,
         }
@@ -187,29 +171,45 @@ fn cascade(of: &Cascade) -> Vec<Gain> {
         .collect()
 }
 
-/// The gains of the parallel form, those that are used.
-fn parallel(all: &[Option<Pid>; 3], goal: &Pid, units: &Units) -> Vec<Gain> {
-    let of = |name: &str, unit: &str, value: &dyn Fn(&Pid) -> f64| {
-        let values = all.map(|pid| pid.as_ref().map(value));
-        let is_used = values.iter().flatten().any(|value| *value != 0.0);
-        (is_used || name == WEIGHT && goal.ki != 0.0).then(|| gain(name, unit.trim(), values))
-    };
+/// The gains of the parallel form, those that are used, and what belongs to them.
+fn parallel(all: &[Option<Pid>; 3], units: &Units) -> Vec<Gain> {
+    let gains = [
+        used("Kp", &units.controller(""), all, &|pid| pid.kp),
+        used("Ki", &units.integral(), all, &|pid| pid.ki),
+        used("Kd", &units.controller(" s"), all, &|pid| pid.kd),
+    ];
+    gains.into_iter().flatten().chain(beside(all)).collect()
+}
+
+/// The filter of the measurement, if there is one, and the set-point weight of an integral controller.
+fn beside(all: &[Option<Pid>; 3]) -> impl Iterator<Item = Gain> {
     let weight = |pid: &Pid| match pid.ki == 0.0 {
         true => 0.0,
         false => pid.setpoint_weight,
     };
-    let gains = [
-        of("Kp", &units.controller(""), &|pid| pid.kp),
-        of("Ki", &units.integral(), &|pid| pid.ki),
-        of("Kd", &units.controller(" s"), &|pid| pid.kd),
-        of(FILTER, "s", &|pid| pid.filter_s),
-        of(WEIGHT, "", &weight),
-    ];
-    gains.into_iter().flatten().collect()
+    let values = all.map(|pid| pid.as_ref().map(weight));
+    let is_integral = all[2].is_some_and(|goal| goal.ki != 0.0);
+    let filter = used("filter Tf", "s", all, &|pid| pid.filter_s);
+    let weight = (is_integral || is_used(&values)).then(|| gain("set-point weight b", "", values));
+    filter.into_iter().chain(weight)
+}
+
+fn used(
+    name: &str,
+    unit: &str,
+    all: &[Option<Pid>; 3],
+    value: &dyn Fn(&Pid) -> f64,
+) -> Option<Gain> {
+    let values = all.map(|pid| pid.as_ref().map(value));
+    is_used(&values).then(|| gain(name, unit.trim(), values))
+}
+
+fn is_used(values: &[Option<f64>; 3]) -> bool {
+    values.iter().flatten().any(|value| *value != 0.0)
 }
 
 /// The gains as a controller of a process control system takes them. `None`: none is named, or it cannot take them.
-fn in_plant(choice: &Controllers, all: [Option<Pid>; 3], units: &Units) -> Option<Vec<Gain>> {
+fn in_plant(choice: &Controllers, all: [Option<Pid>; 3]) -> Option<Vec<Gain>> {
     let (vendor, spans) = choice.plant?;
     let typed = all.map(|pid| vendor.typed(&pid?, &spans).ok());
     let value = |of: usize, name: &str| {
@@ -226,11 +226,9 @@ fn in_plant(choice: &Controllers, all: [Option<Pid>; 3], units: &Units) -> Optio
         ];
         Some(gain(of.name, of.unit, values))
     });
-    // What belongs to the loop that is shown and is set apart from the gains.
-    let beside = parallel(&all, all[2].as_ref()?, units).into_iter();
+    // A controller that fixes neither has both as settings of their own.
     let is_settable = vendor.law().setpoint_weight.is_none();
-    let beside =
-        beside.filter(|gain| is_settable && [FILTER, WEIGHT].contains(&gain.name.as_str()));
+    let beside = beside(&all).filter(|_| is_settable);
     Some(named.chain(beside).collect())
 }
 
@@ -293,14 +291,14 @@ fn next(of: Advice, subject: &Subject<'_>, is_of_firmware: bool) -> String {
 /// The action of a process control system's controller, which is a setting of its own beside the gains.
 fn action(subject: &Subject<'_>) -> String {
     let choice = subject.choice;
-    let typed = choice.and_then(|choice| {
+    let says = choice.and_then(|choice| {
         let (vendor, spans) = choice.plant?;
         let (design, _) = choice.design()?;
         let is_set = vendor.has_range_of_measurement();
         let gains = vendor.typed(&design.controller.pid(), &spans).ok()?;
-        is_set.then(|| gains.first().is_some_and(|gain| gain.value < 0.0))
+        is_set.then(|| format!(" The action of the controller is {}.", action_of(&gains)))
     });
-    typed.map_or(String::new(), words::action)
+    says.unwrap_or_default()
 }
 
 /// Settings that choose a loop.

@@ -86,25 +86,34 @@ impl InForce {
     }
 }
 
+/// Ripple and rounding of a full output.
+const RIPPLE: f64 = 1.05;
+
+/// Least full scale of usual devices that holds a recorded input.
+#[must_use]
+pub fn full_scale(input: &[f64]) -> f64 {
+    let usual = [
+        1.0, 100.0, 127.0, 255.0, 1000.0, 1023.0, 4095.0, 32767.0, 65535.0,
+    ];
+    let most = most(input);
+    let holds = usual.into_iter().find(|full| most <= RIPPLE * full);
+    holds.unwrap_or(most.ceil())
+}
+
+fn most(input: &[f64]) -> f64 {
+    input.iter().fold(0.0, |most, input| most.max(input.abs()))
+}
+
 /// Refuses a recording whose input leaves the range that it has if none is given, or one of 0 to 1 where that is larger: the gains would be wrong by their ratio.
 fn check_range(vendor: Vendor, recording: &Recording) -> Result<(), Error> {
-    /// Ripple and rounding of a full output.
-    const RIPPLE: f64 = 1.05;
     let full = vendor.full_input();
-    let most = recording
-        .input()
-        .iter()
-        .fold(0.0, |most: f64, input| most.max(input.abs()));
+    let (most, such) = (most(recording.input()), full_scale(recording.input()));
     // An input that stays within 1 of a hundred is a share.
     let is_share = full > 1.0 && most <= 1.0;
     if !vendor.counts_output() || (most <= RIPPLE * full && !is_share) {
         return Ok(());
     }
-    let full_scales = [
-        1.0, 100.0, 127.0, 255.0, 1000.0, 1023.0, 4095.0, 32767.0, 65535.0,
-    ];
-    let such = full_scales.into_iter().find(|full| most <= RIPPLE * full);
-    let (only, such) = (if is_share { "only " } else { "" }, such.unwrap_or(most));
+    let only = if is_share { "only " } else { "" };
     Err(Error::Request(format!(
         "the input {only}reaches {most}, and `vendor={}` takes 0..{full} for its range: give the range of the recorded input, such as `input_range=0..{such}`",
         vendor.name()

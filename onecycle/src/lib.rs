@@ -291,6 +291,7 @@ pub mod words;
 pub use builder::{Identify, with_signals};
 pub use design::DesignReport;
 pub use error::Error;
+pub use in_force::full_scale;
 pub use report::Report;
 pub use request::{DesignRequest, Request, Requirements};
 pub use results::answer::{Advice, Answer};

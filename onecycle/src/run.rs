@@ -207,6 +207,7 @@ impl Request {
             .transpose()?;
         let answer = answer::of(
             &identification,
+            &recording,
             &answer::Subject {
                 file: &name,
                 units: &Units::of(&recording),
@@ -216,7 +217,6 @@ impl Request {
                 share: self.write.step,
             },
         );
-        let answer = answer::watching(answer, &identification, &recording);
         Ok(Report {
             name,
             recording,

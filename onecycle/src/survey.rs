@@ -45,11 +45,13 @@ pub(crate) fn survey(
 ) -> Result<Survey, Error> {
     let file = LogFile::scan(source)?;
     let number = file.flight(request.flight);
+    let is_damaged = file.log.loss.is_truncated || file.log.loss.bytes_skipped > 0;
     let mut surveyed = Survey {
         file: source.name(),
         number,
         firmware: String::new(),
-        lost: loss(&file.log.loss),
+        // What the logger itself dropped is in no copy of the file.
+        lost: loss(&file.log.loss).filter(|_| is_damaged),
         ending: None,
         loops: vec![],
         files: None,

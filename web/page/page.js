@@ -307,15 +307,11 @@ const showSystem = () => {
   at("input-range").placeholder = of ? `0..${of.full_input}` : "";
   at("output-range-label").hidden = !of?.has_range_of_measurement;
 };
-// The range of the recorded input where it is larger than that of the controller: the next one that devices have.
-const recordedRange = (of) => {
-  const most = Math.max(...(thinned?.input ?? []).map((point) => Math.abs(point[1])));
-  return most > 1.05 * of.full_input ? `0..${[1, 100, 127, 255, 1000, 1023, 4095, 32767, 65535].find((full) => most <= 1.05 * full) ?? Math.ceil(most)}` : "";
-};
 for (const id of SYSTEM) at(id).onchange = async () => {
   const of = vendor();
   if (!of?.counts_output) at("input-range").value = "";
-  else if (id === "vendor") at("input-range").value = recordedRange(of);
+  // The recorded input where it is larger than the controller's.
+  else if (id === "vendor") at("input-range").value = signals.full_scale > of.full_input ? `0..${signals.full_scale}` : "";
   if (!of?.has_range_of_measurement) at("output-range").value = "";
   for (const name of SYSTEM) keep(name, at(name).value);
   showSystem();

@@ -210,17 +210,15 @@ fn typed(vendor: Vendor, gains: &[TypedGain; 3], spans: &Spans) -> String {
         );
         value.trim_end().to_owned()
     });
-    let is_direct = gains.first().is_some_and(|gain| gain.value < 0.0);
-    let action = if is_direct { "direct" } else { "reverse" };
+    let action = words::action(gains);
     if !vendor.has_range_of_measurement() {
         let values = shown.collect::<Vec<_>>().join(", ");
         let lines = vendor.lines(gains).map_or(values, |lines| {
             lines.replace('\n', ", ").replace(":, ", ": ")
         });
-        let reversed = if is_direct {
-            "; the sign of the action is reversed"
-        } else {
-            ""
+        let reversed = match action {
+            "direct" => "; the sign of the action is reversed",
+            _ => "",
         };
         return match vendor.counts_output() {
             true => format!(

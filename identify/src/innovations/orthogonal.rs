@@ -28,24 +28,29 @@ impl Orthogonal {
             r: Vec::with_capacity(columns.len()),
             scale: Vec::with_capacity(columns.len()),
         };
+        found.extend(columns);
+        found
+    }
+
+    /// Adds further columns, those that are no combination of the ones before.
+    pub(crate) fn extend(&mut self, columns: &[Vec<f64>]) {
         for column in columns {
             let length = dot(column, column).sqrt();
             if !(length.is_finite() && length > 0.0) {
                 continue;
             }
             let mut rest: Vec<f64> = column.iter().map(|v| v / length).collect();
-            let mut r = found.project(&mut rest);
+            let mut r = self.project(&mut rest);
             let left = dot(&rest, &rest).sqrt();
             if left < LEAST {
                 continue;
             }
             rest.iter_mut().for_each(|v| *v /= left);
             r.push(left);
-            found.q.push(rest);
-            found.r.push(r);
-            found.scale.push(length);
+            self.q.push(rest);
+            self.r.push(r);
+            self.scale.push(length);
         }
-        found
     }
 
     /// Number of columns of which at least a share `least` of the length is no combination of those before them.

@@ -83,27 +83,35 @@ pub(super) fn leads(blocks: &Blocks<'_>, at: &Evaluation) -> Option<f64> {
         .filter(|(row, _)| whole.contains(row))
         .collect();
     let count = used.len() as f64;
-    if count < 4.0 * LAGS as f64 || follows(blocks) {
+    if count < 4.0 * LAGS as f64 {
         return None;
     }
     let target = centred(used.iter().map(|(_, e)| *e));
     let column = |place: usize| centred(used.iter().map(|(row, _)| inputs[row + place - LAGS]));
     // Those of the same block are earlier ones: an input that switched between two samples is logged with the later one.
-    let mut columns: Vec<Vec<f64>> = (1..=LAGS).map(column).collect();
-    let earlier = Orthogonal::independent(&columns);
-    columns.extend((LAGS + 1..=LAGS + LEADS).map(column));
-    let all = Orthogonal::independent(&columns);
-    let (before, after) = (earlier.left(&target), all.left(&target));
-    let (more, freedom) = (
-        (all.len() - earlier.len()) as f64,
-        count - all.len() as f64 - 1.0,
-    );
+    let earlier: Vec<Vec<f64>> = (1..=LAGS).map(column).collect();
+    let later: Vec<Vec<f64>> = (LAGS + 1..=LAGS + LEADS).map(column).collect();
     let least = blocks.record.floor.powi(2) / at.variance * count;
-    let (share, f) = (
-        1.0 - after / before,
-        (before - after) / more / (after.max(least) / freedom),
-    );
-    (share > ANOTHER_KIND.0 && f > ANOTHER_KIND.1).then_some(share)
+    let (share, f) = explained_beyond(&target, &earlier, &later, least)?;
+    let is_late = share > ANOTHER_KIND.0 && f > ANOTHER_KIND.1;
+    (is_late && !follows(blocks)).then_some(share)
+}
+
+/// Share of `target` beyond the columns `first` that the columns `more` explain, and its F statistic. `least`: the least sum of squares
+/// that is believed to be left. `None` if nothing is left, or if `more` are combinations of `first`.
+fn explained_beyond(
+    target: &[f64],
+    first: &[Vec<f64>],
+    more: &[Vec<f64>],
+    least: f64,
+) -> Option<(f64, f64)> {
+    let mut columns = Orthogonal::independent(first);
+    let (before, own) = (columns.left(target), columns.len());
+    columns.extend(more);
+    let (after, all) = (columns.left(target), columns.len());
+    let freedom = target.len() as f64 - all as f64 - 1.0;
+    let f = (before - after) / (all - own) as f64 / (after.max(least) / freedom);
+    (before > 0.0 && all > own).then_some((1.0 - after / before, f))
 }
 
 /// Share of the innovations that the input of the blocks before explains, and its F statistic. The input of the same
@@ -188,18 +196,8 @@ fn follows(blocks: &Blocks<'_>) -> bool {
             .map(|lag| centred(rows.clone().map(|row| values[row - lag])))
             .collect()
     };
-    let mut columns = of_past(&inputs);
-    let own = Orthogonal::independent(&columns);
-    columns.extend(of_past(&outputs));
-    let both = Orthogonal::independent(&columns);
-    let (before, after) = (own.left(&target), both.left(&target));
-    let more = (both.len() - own.len()) as f64;
-    if before <= 0.0 || both.len() == own.len() {
-        return false;
-    }
-    let share = 1.0 - after / before;
-    let f = (share / more) / ((1.0 - share) / (count - both.len() as f64 - 1.0));
-    f > FED_BACK
+    let explained = explained_beyond(&target, &of_past(&inputs), &of_past(&outputs), 0.0);
+    explained.is_some_and(|(_, f)| f > FED_BACK)
 }
 
 /// Whether an input switches between two levels at least four times: twice from each.

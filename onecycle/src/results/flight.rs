@@ -44,7 +44,7 @@ pub struct Survey {
     pub number: usize,
     /// Empty if the file has no such flight.
     pub firmware: String,
-    /// What the file has lost. `None`: nothing.
+    /// What the file has lost, where it is cut off or damaged.
     pub lost: Option<String>,
     /// Usual ending of a file with its parameters. `None`: it has no known format.
     pub ending: Option<&'static str>,

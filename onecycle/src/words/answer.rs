@@ -148,8 +148,8 @@ pub fn first(choice: &Controllers) -> String {
 const ALIKE: f64 = 1.5;
 const NARROW: f64 = 5.0;
 
-/// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
-pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
+/// How well the gain is known: at rest, or of an integrator its steady rate, and the slope with which a step of the input begins.
+fn gain_known(identified: &Identified) -> String {
     let percent = |[low, estimate, high]: [f64; 3]| {
         let width = (high - low) / (2.0 * estimate.abs());
         width.is_finite().then(|| (100.0 * width).ceil().max(1.0))
@@ -166,7 +166,7 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
     } else {
         "gain at rest"
     };
-    let gain = match (slope, end) {
+    match (slope, end) {
         (Some(slope), Some(end)) if slope.max(end) > NARROW.max(ALIKE * slope.min(end)) => {
             format!("{name} known to {end} %, first slope to {slope} %")
         }
@@ -176,7 +176,12 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
         (Some(known), Some(other)) => format!("gain known to {} %", known.max(other)),
         (Some(known), None) | (None, Some(known)) => format!("gain known to {known} %"),
         (None, None) => "the gain has no upper end".to_owned(),
-    };
+    }
+}
+
+/// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
+pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
+    let gain = gain_known(identified);
     let prediction = (identified.fit.innovations()).and_then(|of| of.prediction.as_ref());
     let misfit = short(100.0 * identified.fit.misfit);
     let model = match (explained, prediction) {
@@ -185,11 +190,9 @@ pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
             "it does not predict the last third of the recording".to_owned()
         }
         (_, Some(of)) => {
-            let is_low = of.explained < 0.9 && of.is_as_good_as_disturbances_allow();
-            let rest = if is_low {
-                ", the rest is disturbances and noise"
-            } else {
-                ""
+            let rest = match !of.is_good() && of.is_as_good_as_disturbances_allow() {
+                true => ", the rest is disturbances and noise",
+                false => "",
             };
             format!(
                 "it predicts {:.0} % of the last third{rest}",
@@ -258,12 +261,6 @@ pub fn type_in(share: f64) -> String {
         "Type in {} of the step, record again, and go on from there.",
         part(share)
     )
-}
-
-/// Whether the output of a controller rises with the measurement: the direct action.
-pub fn action(is_direct: bool) -> String {
-    let action = if is_direct { "direct" } else { "reverse" };
-    format!(" The action of the controller is {action}.")
 }
 
 /// A share of the way to the proposed gains.

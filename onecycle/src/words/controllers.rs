@@ -2,7 +2,7 @@
 //! the verdict on the gains that the user flies now.
 
 use crate::{DesignError, Form, Robustness, Specification, Style};
-use onecycle_design::{Limit, Missed, VendorError};
+use onecycle_design::{Limit, Missed, TypedGain, VendorError};
 
 use crate::results::controllers::{Against, Controllers, Source};
 use crate::words::number::{frequency, seconds, short, significant};
@@ -16,6 +16,14 @@ pub fn no_gains(error: VendorError) -> &'static str {
         VendorError::NoProportional => "its form needs a proportional gain",
         VendorError::NoDerivative => "it has no derivative; use `controller=pi`",
         _ => "check `output_range` and `input_range`",
+    }
+}
+
+/// The action of a controller with these gains: direct if its output rises with the measurement.
+pub fn action(gains: &[TypedGain; 3]) -> &'static str {
+    match gains[0].value < 0.0 {
+        true => "direct",
+        false => "reverse",
     }
 }
 

@@ -13,7 +13,9 @@ mod train;
 
 use clap::{Parser, Subcommand};
 
-pub(crate) use self::bench::{Answers, Bench, BenchAction, Format, MakeBench, RunBench};
+pub(crate) use self::bench::{
+    Answers, Bench, BenchAction, CLASSIFIER, Format, MakeBench, RunBench,
+};
 pub(crate) use self::campaign::Campaign;
 pub(crate) use self::certify::Certify;
 pub(crate) use self::classify::Classify;

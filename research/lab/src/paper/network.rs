@@ -9,12 +9,12 @@ use super::classifier::{
     Class, ClassifierError, ClassifierRecipe, Gain, INPUTS, Measured, PickRule, Prepared,
     most_likely,
 };
-use crate::experiments::{SAMPLE_S, SampledCycle, last_steady_cycle};
-use crate::judge::evaluate::{Answer, Feedback};
+use crate::experiments::{SAMPLE_S, SampledCycle, last_steady_cycle, signals_of};
+use crate::judge::evaluate::Answer;
 use crate::learn::onnx::{self, OnnxError};
 use crate::learn::train::{Loss, Matrix, Network, TrainError};
 use crate::workers::OneThread;
-use onecycle_onboard::SoiptdError;
+use onecycle_onboard::{Pd, SoiptdError};
 
 /// Key of the card in the metadata of a model, and its version.
 pub const FORMAT: &str = "onecycle.classifier/1";
@@ -159,46 +159,32 @@ impl PaperNetwork {
     /// [`NoPick`]: there is no steady cycle, or it has no gain.
     pub fn answer(&self, signals: &Signals<'_>) -> Result<Answer, NoPick> {
         let cycle = last_cycle(signals).ok_or(NoPick::NotSteady)?;
-        Ok(self.pick(&cycle)?.answer)
+        Ok(self.pick(&cycle, 1.0)?.answer)
     }
 
     /// As [`Self::answer`], of a relay of any levels at any sample rate, whose period must be one that the classes have.
     ///
     /// # Errors
-    /// [`NoPick`]: there is no steady cycle, it is none of the classes', or it has no gain.
+    /// [`NoPick`]: the recording has no steady cycle, no class has its period, or it tells no gain.
     pub fn answer_to_any(&self, signals: &Signals<'_>) -> Result<Pick, NoPick> {
         let (trace, amplitude) = normalised(signals).ok_or(NoPick::NotSteady)?;
-        let even = Signals::even(&trace.time_s, &trace.input, &trace.output, SAMPLE_S);
-        let cycle = last_cycle(&even).ok_or(NoPick::NotSteady)?;
-        let period_s = cycle.output.len() as f64 * SAMPLE_S;
-        let periods = self.classes.iter().map(|class| class.period_s);
-        let (shortest_s, longest_s) = periods
-            .fold((f64::INFINITY, 0.0), |(low, high), period_s| {
-                (period_s.min(low), period_s.max(high))
-            });
+        let cycle = last_cycle(&signals_of(&trace, SAMPLE_S)).ok_or(NoPick::NotSteady)?;
+        let pick = self.pick(&cycle, amplitude)?;
+        let (shortest_s, longest_s) = range(self.classes.iter().map(|class| class.period_s));
         let (shortest_s, longest_s) = (SHORTENED * shortest_s, LENGTHENED * longest_s);
-        if !(shortest_s..=longest_s).contains(&period_s) {
-            return Err(NoPick::Period {
+        let period_s = pick.period_s;
+        match (shortest_s..=longest_s).contains(&period_s) {
+            true => Ok(pick),
+            false => Err(NoPick::Period {
                 period_s,
                 shortest_s,
                 longest_s,
-            });
+            }),
         }
-        let mut pick = self.pick(&cycle)?;
-        // An input in amplitudes of the relay: the gain is that much too large, the controller too small.
-        let process = pick
-            .answer
-            .process
-            .map(|of| of.with_gain_scaled(amplitude.recip()));
-        pick.answer.process = process.transpose()?;
-        if let Feedback::Pd(pd) = &mut pick.answer.feedback {
-            pd.kp *= amplitude;
-            pd.kd *= amplitude;
-        }
-        Ok(pick)
     }
 
-    fn pick(&self, cycle: &SampledCycle) -> Result<Pick, NoPick> {
+    /// The class of a cycle whose input is in amplitudes of the relay. `amplitude`: that of the relay (input unit).
+    fn pick(&self, cycle: &SampledCycle, amplitude: f64) -> Result<Pick, NoPick> {
         let recipe = &self.card.recipe;
         // Nothing measured matches the gain of an unknown process.
         let gain = match recipe.gain {
@@ -211,12 +197,14 @@ impl PaperNetwork {
         let outputs = self.network.evaluate(&inputs, &OneThread)?;
         let number = most_likely(outputs.row(0));
         let class = &self.classes[number];
-        let process = class.process.with_gain_scaled(class.gain(&measured))?;
+        let gain = class.gain(&measured) / amplitude;
+        let Pd { kp, kd } = class.controller(&measured);
+        let (kp, kd) = (kp * amplitude, kd * amplitude);
         Ok(Pick {
             class: number,
             answer: Answer {
-                process: Some(process),
-                ..Answer::of_gains(class.controller(&measured))
+                process: Some(class.process.with_gain_scaled(gain)?),
+                ..Answer::of_gains(Pd { kp, kd })
             },
             period_s: cycle.output.len() as f64 * cycle.sample_s,
             class_period_s: class.period_s,
@@ -235,11 +223,7 @@ fn normalised(signals: &Signals<'_>) -> Option<(Trace, f64)> {
         &signals.input[first..],
         &signals.output[first..],
     );
-    let (low, high) = input
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-            (value.min(low), value.max(high))
-        });
+    let (low, high) = range(input.iter().copied());
     let (centre, amplitude) = (0.5 * (high + low), 0.5 * (high - low));
     if amplitude <= 0.0 {
         return None;
@@ -260,6 +244,13 @@ fn normalised(signals: &Signals<'_>) -> Option<(Trace, f64)> {
         trace.push(at_s, (input[row] - centre) / amplitude, y, y);
     }
     Some((trace, amplitude))
+}
+
+/// Least and largest value.
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (value.min(low), value.max(high))
+    })
 }
 
 /// The samples of the last steady cycle of a relay of amplitude one.

@@ -139,6 +139,9 @@ pub(crate) struct RunBench {
     pub(crate) json: bool,
 }
 
+/// Name of the paper's classifier among the methods.
+pub(crate) const CLASSIFIER: &str = "classifier";
+
 /// A list of different methods.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Methods(pub(crate) Vec<Contender>);
@@ -191,7 +194,8 @@ impl FromStr for Answers {
                 "'{text}' is not a name and a file such as mine=answers.csv"
             ));
         }
-        if name.contains(['|', '\n', '\r']) || Contender::from_name(&name).is_some() {
+        let is_method = name == CLASSIFIER || Contender::from_name(&name).is_some();
+        if is_method || name.contains(['|', '\n', '\r']) {
             return Err(format!(
                 "answers cannot be named '{name}': choose another name"
             ));

@@ -7,8 +7,8 @@ use clap::Args;
 /// Identify relay tests by the paper's classifier: the class of the last steady cycle and its PD controller.
 ///
 /// The network is one that `onecycle-lab train` has written as ONNX for a recipe with network = "classifier".
-/// It knows the processes of its space only, and it cannot tell that a process is none of them, unless the
-/// period says so: onecycle identify has intervals, other structures and other controllers.
+/// It takes every process for one of those that it was trained on; only a period that none of them has is
+/// refused. Intervals, other structures and other controllers: onecycle identify.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",

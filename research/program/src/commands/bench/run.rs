@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use super::folder::{self, TRUTH, read_text};
 use super::recordings::Recordings;
 use super::traces;
-use crate::args::{self, RunBench};
+use crate::args::{self, CLASSIFIER, RunBench};
 use crate::commands::classify;
 use crate::commands::clock::thread_seconds;
 use crate::journal::Journal;
@@ -33,10 +33,8 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     let network = arguments.network.as_deref().map(classify::network);
     let network = network.transpose()?;
     let computes = !methods.is_empty() || network.is_some();
-    let recordings = match computes {
-        false => None,
-        true => Some(Recordings::open(&arguments.folder, &manifest)?),
-    };
+    let recordings = computes.then(|| Recordings::open(&arguments.folder, &manifest));
+    let recordings = recordings.transpose()?;
     if let Some(folder) = &arguments.traces {
         traces::check(folder, &methods)?;
     }
@@ -115,9 +113,6 @@ fn opened(
     )
 }
 
-/// Name of the paper's classifier among the methods.
-const CLASSIFIER: &str = "classifier";
-
 /// Experiments of each thread between two writes to the journal: few, because a killed run loses them.
 const LOT: usize = 4;
 
@@ -171,11 +166,6 @@ fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failu
     let experiments: BTreeSet<u64> = truths.iter().map(|truth| truth.number).collect();
     let mut records = Vec::new();
     for (index, answers) in all.iter().enumerate() {
-        if answers.name == CLASSIFIER {
-            return Err(Failure::usage(format!(
-                "answers cannot be named '{CLASSIFIER}': choose another name"
-            )));
-        }
         if all[..index]
             .iter()
             .any(|before| before.name == answers.name)
