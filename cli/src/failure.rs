@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use onecycle::Error;
+use onecycle::{Error, shown};
 use onecycle_link::ReadError;
 
 /// Exit codes, as `--help` lists them.
@@ -32,7 +32,7 @@ pub enum Failure {
     #[error(transparent)]
     Request(#[from] Error),
     /// Any other file that cannot be read or has the wrong content.
-    #[error("{file}: {reason}", file = path.display())]
+    #[error("{file}: {reason}", file = shown(path))]
     Unreadable { path: PathBuf, reason: String },
     /// A vehicle that is not heard, refuses, or has changed by half, with the exit code.
     #[cfg(not(target_family = "wasm"))]
@@ -69,7 +69,7 @@ impl Failure {
 
     pub fn output(target: &Path, reason: io::Error) -> Self {
         Self::Output {
-            target: target.display().to_string(),
+            target: shown(target),
             reason,
         }
     }

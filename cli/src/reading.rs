@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-use onecycle::Source;
+use onecycle::{Source, shown};
 use onecycle_link::LogFormat;
 
 use crate::failure::Failure;
@@ -106,7 +106,7 @@ fn piped() -> Result<Vec<u8>, Failure> {
 
 impl Source for Input<'_> {
     fn name(&self) -> String {
-        self.path.display().to_string()
+        shown(self.path)
     }
 
     fn open(&self) -> io::Result<Box<dyn Read + '_>> {

@@ -12,6 +12,7 @@
 //! 5. test the innovations, predict the last third from the first two      validate
 //! 6. refuse what the record does not tell                                 judge
 //! 7. draw from the posterior, design the controller                       design
+//!    judge its loop with the response that the past input shows           flexible
 //! ```
 //!
 //! The likelihood itself is in `likelihood`, on the matrices of `lifted` and the response of `response`. Method: L. Ljung,
@@ -26,6 +27,7 @@ mod descent;
 mod draws;
 mod filter;
 mod fitted;
+mod flexible;
 mod forces;
 mod laplace;
 mod lifted;
@@ -53,7 +55,7 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
-use onecycle_design::{Parameter, Structure};
+use onecycle_design::{Design, Parameter, Structure};
 
 use self::choose::NEARLY;
 use self::fitted::{Disturbances, Fitted};
@@ -80,7 +82,7 @@ use crate::settings::Options;
 use crate::signals::{Signals, is_constant};
 use crate::thresholds::{
     ANOTHER_KIND, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED, MOST_DEVIATION,
-    MOST_ERROR_RATIO, STRONGLY_COLOURED, WELL_PREDICTED,
+    MOST_ERROR_RATIO, MOST_TAKEN, STRONGLY_COLOURED, WELL_PREDICTED,
 };
 use crate::verdict::Verdict;
 
@@ -391,7 +393,20 @@ impl Search<'_> {
             || fit(fitted, blocks, prepared.start_s, checked),
         );
         self.remarks = remarks;
-        found
+        // What the model lacks counts by what it does to the loop.
+        let is_risky = |design: Design| {
+            let theta = &fitted.best.found.theta;
+            let span_s = theta.lags_s().sum::<f64>() + theta.tau_s().max(0.0);
+            let taken =
+                || flexible::distance_taken(&fitted.record, span_s, &model, &design.controller);
+            is_left_to_the_input(&tests) && taken() > MOST_TAKEN
+        };
+        match found {
+            Ok(found) if found.design.is_some_and(is_risky) => Err(Verdict::InputLeft {
+                share: tests.input_share,
+            }),
+            other => other,
+        }
     }
 }
 

@@ -31,6 +31,9 @@ pub(crate) const LEFT: (f64, f64) = (0.02, 3.0);
 /// The same. Above both, with a prediction below [`WELL_PREDICTED`]: `not_this_process`. Campaign: as [`LEFT`]. Of later inputs without
 /// feedback: `clock_offset`. Argument: noise moves the switching of a relay, in a few rows of a hundred.
 pub(crate) const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
+/// Share of the distance of the proposed loop from instability that the response to the input takes for certain, beyond the model's,
+/// where [`LEFT`] is exceeded. Above: `not_this_process`. Argument: the peak of the sensitivity is twice the one that is promised.
+pub(crate) const MOST_TAKEN: f64 = 0.5;
 /// F statistic of twenty past inputs in the innovations of a relay test, of 1,200 rows. Above: refused. Argument: chance exceeds it
 /// once in a hundred records.
 pub(crate) const MOST_INPUT_F: f64 = 1.88;

@@ -181,7 +181,8 @@ impl Columns {
     }
 }
 
-/// A gap in the recording: no samples for longer than [`GAP_PERIODS`] median increments of time.
+/// A gap in the recording: no samples for longer than [`GAP_PERIODS`] median increments of time, and for longer than chance makes
+/// the longest of increments that differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

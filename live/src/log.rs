@@ -202,7 +202,7 @@ impl Window {
         }
     }
 
-    /// Takes a block in, whether it is new or not. False: it is not of this window.
+    /// Takes a block in. False: it is not of this window, or is there already.
     fn take(&mut self, data: &LOG_DATA_DATA) -> bool {
         let Some(at) = data.ofs.checked_sub(self.start) else {
             return false;
@@ -219,10 +219,9 @@ impl Window {
         }
         let count = count.min(wanted);
         self.bytes[at..at + count].copy_from_slice(&data.data[..count]);
-        if let Some(has) = self.has.get_mut(at / BLOCK as usize) {
-            *has = true;
-        }
-        true
+        // Only a new block is worth waiting for the next: a vehicle may repeat one for ever.
+        let has = self.has.get_mut(at / BLOCK as usize);
+        has.is_none_or(|has| !std::mem::replace(has, true))
     }
 
     /// Place and length of the first blocks in a row that are missing.

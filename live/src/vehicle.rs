@@ -202,8 +202,9 @@ impl Vehicle {
             MavMessage::EXTENDED_SYS_STATE(of) => seen.extended = Some(of.clone()),
             MavMessage::AUTOPILOT_VERSION(of) => self.version = Some(of.clone()),
             MavMessage::STATUSTEXT(of) => {
-                seen.texts
-                    .push(of.text.to_str().unwrap_or_default().to_owned());
+                // Control characters would command a terminal.
+                let text = of.text.to_str().unwrap_or_default();
+                seen.texts.push(text.replace(char::is_control, " "));
                 let more = seen.texts.len().saturating_sub(TEXTS);
                 seen.texts.drain(..more);
             }

@@ -297,7 +297,7 @@ pub use request::{DesignRequest, Request, Requirements};
 pub use results::answer::{Advice, Answer};
 pub use results::controllers::Controllers;
 pub use results::flight::Survey;
-pub use source::{LogFile, Source};
+pub use source::{LogFile, Source, shown};
 
 // Recordings.
 #[doc(inline)]

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use onecycle_link::{
     Axis, ControlLoop, CsvOptions, Flight, FlightLog, LogError, LogFormat, ReadBack, ReadError,
@@ -35,9 +35,15 @@ pub trait Source: Sync {
     }
 }
 
+/// A path as text for people: control characters, which would command a terminal, are replaced.
+pub fn shown(path: &Path) -> String {
+    let text = path.display().to_string();
+    text.replace(char::is_control, "\u{fffd}")
+}
+
 impl Source for PathBuf {
     fn name(&self) -> String {
-        self.display().to_string()
+        shown(self)
     }
 
     fn open(&self) -> io::Result<Box<dyn Read + '_>> {

@@ -21,6 +21,7 @@ mod flight_log_gains;
 mod flight_logs;
 mod fly;
 mod heaters;
+mod hostile_names;
 mod imports;
 mod json_schema;
 mod library;

@@ -100,6 +100,17 @@ impl Orthogonal {
         )
     }
 
+    /// Standard deviation of a linear function of the coefficients, `gradient' x`, per unit of that of the noise of `y`: the length
+    /// of `R^-T gradient`. Only if no column was left out.
+    pub(super) fn deviation(&self, gradient: &[f64]) -> f64 {
+        let mut z: Vec<f64> = Vec::with_capacity(gradient.len());
+        for ((r, g), scale) in self.r.iter().zip(gradient).zip(&self.scale) {
+            let (above, diagonal) = r.split_at(z.len());
+            z.push((g / scale - dot(above, &z)) / diagonal[0]);
+        }
+        dot(&z, &z).sqrt()
+    }
+
     /// `ln|X'X| / 2`.
     pub(super) fn log_determinant(&self) -> f64 {
         let diagonal = (self.r.iter().zip(&self.scale)).map(|(r, s)| (r[r.len() - 1] * s).ln());

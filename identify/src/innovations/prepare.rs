@@ -19,8 +19,9 @@ const EVEN: f64 = 1e-4;
 const OFF_GRID: (f64, f64) = (0.05, 0.45);
 /// Most steps of a grid for each sample.
 const SPARSE: usize = 6;
-/// Uneven time stamps are rounded to this part of the sample period, so that few lengths of step occur.
-const STAMP: f64 = 1.0 / 256.0;
+/// Uneven time stamps are rounded to this part of the sample period, so that few lengths of step occur. The rounding has a standard
+/// deviation of `STAMP / 12^0.5`; behind a lag of five samples it moves the output by less than [`FLOOR`].
+const STAMP: f64 = 1.0 / 64.0;
 /// An output that repeats the one before is stale if at least this share of all other outputs is distinct, or if this
 /// share of the runs of equal outputs has one length: the sensor is slower than the recording. A coarse sensor has few
 /// distinct values and runs of all lengths, and its repetitions are measurements.

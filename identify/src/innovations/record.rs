@@ -140,14 +140,21 @@ impl Record {
         self.rest.map_or_else(|| self.index_at(skip_s), |_| 0)
     }
 
-    /// The same record with its uneven times rounded to a `part` of the sample period, so that few lengths of step occur: the
-    /// likelihood needs the matrices of each. As it is where two samples would meet.
+    /// The same record with its uneven times rounded to a `part` of the sample period, or of an increment that is longer, so that
+    /// few lengths of step occur: the likelihood needs the matrices of each. Where two samples meet the output of the later one
+    /// counts.
     pub(crate) fn rounded(mut self, part: f64) -> Self {
-        let unit_s = self.dt_s * part;
-        let times_s = self.uneven_s.iter();
-        let rounded: Vec<f64> = times_s.map(|t| (t / unit_s).round() * unit_s).collect();
-        if rounded.windows(2).all(|pair| pair[1] > pair[0]) {
-            self.uneven_s = rounded;
+        let mut now_s = 0.0;
+        for sample in 0..self.uneven_s.len() {
+            let step_s: f64 = self.uneven_s[sample] - now_s;
+            let octave = (step_s / self.dt_s).log2().floor().max(0.0);
+            let unit_s = self.dt_s * part * octave.exp2();
+            let rounded_s = (step_s / unit_s).round() * unit_s;
+            if rounded_s == 0.0 && sample > 0 {
+                self.present[sample - 1] = false;
+            }
+            now_s += rounded_s;
+            self.uneven_s[sample] = now_s;
         }
         self
     }

@@ -82,11 +82,16 @@ pub(super) fn best(candidates: impl IntoIterator<Item = Candidate>) -> Option<Ca
 
 /// Copy of a record in even steps of `samples` samples: means of input and output. The output of a step stands at its
 /// middle, half a step after its stamp, so the dead time appears shorter by the second value (s).
-fn coarse(record: &Record, samples: usize) -> (Record, f64) {
+pub(super) fn coarse(record: &Record, samples: usize) -> (Record, f64) {
     if samples <= 1 {
         return (record.clone(), 0.0);
     }
-    let dt_s = record.dt_s * samples as f64;
+    // The period of an uneven record is that of the median: of the mean there are as many rows as the samples fill.
+    let period_s = match record.uneven_s.last() {
+        Some(last_s) => last_s / (record.len() - 1) as f64,
+        None => record.dt_s,
+    };
+    let dt_s = period_s * samples as f64;
     let mut copy = Record {
         uneven_s: vec![],
         dt_s,
@@ -98,7 +103,7 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         forces: Forces::default(),
         floor: record.floor / (samples as f64).sqrt(),
     };
-    let length_s = record.time_s(record.len() - 1) + record.dt_s;
+    let length_s = record.time_s(record.len() - 1) + period_s;
     let steps = (length_s / dt_s + 1e-9) as usize;
     let mut start = 0;
     for step in 1..=steps {
@@ -116,7 +121,7 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         copy.input
             .push(input.unwrap_or(record.input[end.max(1) - 1]));
     }
-    (copy, 0.5 * (samples - 1) as f64 * record.dt_s)
+    (copy, 0.5 * (samples - 1) as f64 * period_s)
 }
 
 /// Mean of values. `None` of none.

@@ -147,7 +147,7 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) 
 }
 
 /// Values less their mean.
-fn centred(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub(super) fn centred(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut column: Vec<f64> = values.collect();
     let mean = mean(&column);
     column.iter_mut().for_each(|v| *v -= mean);

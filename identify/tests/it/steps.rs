@@ -29,10 +29,15 @@ impl Test {
     }
 
     fn of_process(process: [f64; 4], steps: &[(f64, f64)], count: usize) -> Self {
+        let time_s = (0..count).map(|k| k as f64 * SAMPLE_S).collect();
+        Self::at(time_s, steps, &|since| response(process, since))
+    }
+
+    /// Samples at these times of the response to steps, that to a unit step being `response`.
+    fn at(time_s: Vec<f64>, steps: &[(f64, f64)], response: &dyn Fn(f64) -> f64) -> Self {
         let mut random = Pcg64Mcg::seed_from_u64(1);
         // Sum of twelve uniform numbers: nearly normal, of variance one.
         let mut noise = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
-        let time_s: Vec<f64> = (0..count).map(|k| k as f64 * SAMPLE_S).collect();
         let total = |time_s: f64, of: &dyn Fn(f64) -> f64| -> f64 {
             let passed = steps.iter().filter(|(at_s, _)| *at_s <= time_s);
             passed.map(|(at_s, size)| size * of(time_s - at_s)).sum()
@@ -41,7 +46,7 @@ impl Test {
             input: time_s.iter().map(|t| total(*t, &|_| 1.0)).collect(),
             output: time_s
                 .iter()
-                .map(|t| 22.0 + total(*t, &|since| response(process, since)) + 0.05 * noise())
+                .map(|t| 22.0 + total(*t, response) + 0.05 * noise())
                 .collect(),
             time_s,
         }
@@ -272,6 +277,48 @@ fn a_controller_is_not_taken_for_the_process() {
             verdict,
             Some(Verdict::OutputLeads { .. } | Verdict::OfController)
         ),
+        "{verdict:?}"
+    );
+}
+
+// Stamps of a log that stores at any time: increments of the exponential law, whose longest are ten times the median. The rounding of
+// the stamps is hidden in the noise.
+#[test]
+fn stamps_that_follow_no_grid() {
+    let mut random = Pcg64Mcg::seed_from_u64(2);
+    let mut time_s = vec![0.0];
+    for k in 0..1500 {
+        time_s.push(time_s[k] - 2.0 * (1.0 - random.random_range(0.0..1.0_f64)).ln() + 1e-3);
+    }
+    let steps = [(time_s[20], 0.5), (time_s[700], -0.2), (time_s[1100], 0.3)];
+    let test = Test::at(time_s, &steps, &|since| response(HEATER, since));
+    let found = test.identify(&Options::default());
+    is_heater(&found, "uneven stamps");
+}
+
+// (1 - 16 s) e^(-3 s) / ((20 s + 1) (8 s + 1)), which no structure has: a lag behind a longer dead time predicts most of it, and its
+// controller would be unstable with it. The past input shows that.
+#[test]
+fn a_response_that_begins_in_the_wrong_direction() {
+    let inverse = |since: f64| {
+        let (process, zero_s, step_s) = ([1.0, 20.0, 8.0, 3.0], 16.0, 1e-4);
+        let rate = (response(process, since + step_s) - response(process, since)) / step_s;
+        response(process, since) - zero_s * rate
+    };
+    let mut random = Pcg64Mcg::seed_from_u64(3);
+    let mut steps = vec![(50.0, 5.0)];
+    for k in 0..12 {
+        let size = if k % 2 == 0 { -5.0 } else { 5.0 };
+        steps.push((
+            steps[k].0 + random.random_range(60.0..160.0_f64).round(),
+            size,
+        ));
+    }
+    let time_s = (0..1500).map(f64::from).collect();
+    let found = Test::at(time_s, &steps, &inverse).identify(&Options::default());
+    let verdict = found.outcome.err();
+    assert!(
+        matches!(verdict, Some(Verdict::InputLeft { .. })),
         "{verdict:?}"
     );
 }

@@ -6,29 +6,44 @@
 
 use super::GAP_PERIODS;
 
+/// Times that a series of increments would be drawn before the longest of one of them passes for a gap by chance.
+const DRAWS: f64 = 200.0;
+
 /// Increments that are not gaps, gathered one by one.
 #[derive(Debug, Clone)]
 pub(super) struct Rhythm {
     median_s: f64,
+    /// Longer increments are gaps.
+    longest_s: f64,
     count: f64,
-    /// Sum of `increment / median - 1`; every term is between -1 and `GAP_PERIODS - 1`.
+    /// Sum of `increment / median - 1`.
     sum: f64,
     sum_of_squares: f64,
 }
 
 impl Rhythm {
     /// Starts without increments; the median is that of `increments_s`.
+    ///
+    /// Where the increments differ, as in a log that stores changes, a long one is no gap: those above the median are taken
+    /// as exponential, and then `P(increment > median + scale x) = exp(-x) / 2`. The longest quarter begins `ln 2` scales
+    /// above the median, the longest tenth `ln 5`; of samples and pauses, either may say that there is no scale.
     pub(super) fn around_median(mut increments_s: Vec<f64>) -> Self {
-        let middle = increments_s.len() / 2;
-        let median_s = if increments_s.is_empty() {
-            1.0
-        } else {
-            *increments_s
-                .select_nth_unstable_by(middle, f64::total_cmp)
-                .1
+        let count = increments_s.len();
+        let mut with_longer = |longer: usize| match count.saturating_sub(1 + longer) {
+            _ if count == 0 => 1.0,
+            index => *increments_s.select_nth_unstable_by(index, f64::total_cmp).1,
         };
+        let median_s = with_longer(count.div_ceil(2).saturating_sub(1));
+        let scale_s =
+            |part: usize| (with_longer(count.div_ceil(part)) - median_s) / (0.5 * part as f64).ln();
+        let scale_s = [4, 10]
+            .map(scale_s)
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        let by_chance_s = scale_s.max(0.0) * (0.5 * DRAWS * count.max(1) as f64).ln();
         Self {
             median_s,
+            longest_s: (GAP_PERIODS * median_s).max(median_s + by_chance_s),
             count: 0.0,
             sum: 0.0,
             sum_of_squares: 0.0,
@@ -37,10 +52,10 @@ impl Rhythm {
 
     /// Whether the increment is a gap; if not, adds it to mean and standard deviation.
     pub(super) fn is_gap(&mut self, increment_s: f64) -> bool {
-        let ratio = increment_s / self.median_s;
-        if ratio > GAP_PERIODS {
+        if increment_s > self.longest_s {
             return true;
         }
+        let ratio = increment_s / self.median_s;
         self.count += 1.0;
         self.sum += ratio - 1.0;
         self.sum_of_squares += (ratio - 1.0) * (ratio - 1.0);
@@ -101,6 +116,17 @@ mod tests {
         );
         assert!((rhythm.period_s() - 0.0025).abs() < 1e-15);
         assert!((rhythm.jitter() - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn increments_of_chance_are_no_gaps() {
+        // Quantiles of the exponential law of mean 1: the longest of 1,000 is 7.6 (11 medians). Gaps of 100 among them are
+        // found.
+        let drawn = (0..1000).map(|i| -((f64::from(i) + 0.5) / 1000.0).ln());
+        let increments: Vec<f64> = drawn.chain([100.0; 20]).collect();
+        let mut rhythm = Rhythm::around_median(increments.clone());
+        let gaps = increments.iter().filter(|&&one| rhythm.is_gap(one)).count();
+        assert_eq!(gaps, 20);
     }
 
     #[test]

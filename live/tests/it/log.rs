@@ -64,6 +64,18 @@ fn a_part_of_the_list_repeated_for_ever() {
     assert!(world.borrow().now < Duration::from_secs(60));
 }
 
+// So did a download, whose first block came again and again.
+#[test]
+fn a_block_repeated_for_ever() {
+    let world = world();
+    let mut vehicle = connect(&world, None).unwrap();
+    let logs = vehicle.logs().unwrap();
+    world.borrow_mut().vehicle.repeats_a_log = true;
+    let lost = vehicle.download(&logs[4], 0, PATIENCE, &mut |_| Ok(()));
+    assert!(matches!(lost, Err(LogError::Live(LiveError::Lost))));
+    assert!(world.borrow().now < Duration::from_secs(60));
+}
+
 #[test]
 fn the_rest_of_a_log() {
     let world = world();

@@ -321,7 +321,10 @@ impl Scripted {
                 data,
             })
         };
-        (request.ofs as usize..end).step_by(90).map(block).collect()
+        match self.repeats_a_log {
+            true => vec![block(0)],
+            false => (request.ofs as usize..end).step_by(90).map(block).collect(),
+        }
     }
 
     fn about(&self, name: &str) -> Vec<MavMessage> {
