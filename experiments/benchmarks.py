@@ -44,6 +44,7 @@ LEFT_OUT = {
     "--cases=17829": "minutes, and shows one case only",
     "hundred_thousand": "hours in one thread",
     "--ignored": "minutes to hours; by hand",
+    "killed.py": "ten minutes",
     "onecycle-lab train": "minutes to hours; by hand",
     "onecycle-lab reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/benchmarks/reproduction.md",
     "any_peers.py": "needs SIPPY and Octave",

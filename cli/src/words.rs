@@ -8,8 +8,7 @@ use std::sync::OnceLock;
 
 use onecycle::words::{Named, named};
 pub(crate) use onecycle::words::{
-    answer, capital, controllers, flight, log_gains, oscillation, recording, remark, sentence,
-    verdict,
+    answer, controllers, flight, log_gains, oscillation, recording, remark, sentence, verdict,
 };
 #[cfg(feature = "program")]
 pub(crate) use onecycle::words::{limits, log};

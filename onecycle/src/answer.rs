@@ -1,11 +1,13 @@
 //! The answer of a report, made of what was identified, the controllers to choose from and the gains of a log.
 
 use onecycle_design::cascade::Cascade;
-use onecycle_design::{Assessment, Comparison, Controller, Pid, assess};
+use onecycle_design::{Assessment, Comparison, Controller, Model, Pid, assess};
 use onecycle_identify::{Identification, Identified};
 use onecycle_link::{Agreement, ControlLoop, LoopGains, Recording};
 
+use crate::design::DesignReport;
 use crate::log_gains::{LogLoop, pid};
+use crate::request::HALF_STEP;
 use crate::results::answer::{Advice, Answer, Columns, Gain};
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
@@ -74,16 +76,53 @@ pub(crate) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> A
         return not_yet(words::NO_DESIGN.to_owned(), next, Some(sure));
     };
     let to_type = ToType::of(choice, &design.0.controller, subject);
-    let (verdict, reason) = verdict(identified, choice, &design.0.controller);
+    let (model, _) = identified.for_design(0);
+    let draws = || identified.posterior.models(DRAWS);
+    let (verdict, reason) = verdict((&model, &draws), choice, &design.0.controller);
     Answer {
         verdict,
         reason,
         step: Some(subject.share),
-        figures: Some(columns(identified, choice, design.1, to_type.half.as_ref())),
+        figures: Some(columns(&model, choice, design.1, to_type.half.as_ref())),
         sure: Some(sure),
         watch: words::not_kept(choice),
         next: next(verdict, subject, to_type.is_of_firmware),
         gains: to_type.gains,
+    }
+}
+
+impl DesignReport {
+    /// The answer: what to do, what to type in, what comes next.
+    #[must_use]
+    pub fn answer(&self) -> Answer {
+        let subject = Subject {
+            file: "",
+            units: &Units::default(),
+            choice: Some(&self.choice),
+            of_log: None,
+            gains: None,
+            share: HALF_STEP,
+        };
+        let to_type = ToType::of(&self.choice, &self.best.controller, &subject);
+        let members = || {
+            self.oscillation
+                .as_ref()
+                .map_or(vec![], |of| of.family.members.clone())
+        };
+        let (verdict, reason) =
+            verdict((&self.model, &members), &self.choice, &self.best.controller);
+        let full = self.choice.design().map(|(_, figures)| figures);
+        Answer {
+            verdict,
+            reason,
+            step: Some(subject.share),
+            figures: full
+                .map(|full| columns(&self.model, &self.choice, full, to_type.half.as_ref())),
+            sure: None,
+            watch: words::not_kept(&self.choice),
+            next: next(verdict, &subject, to_type.is_of_firmware),
+            gains: to_type.gains,
+        }
     }
 }
 
@@ -95,15 +134,14 @@ fn not_yet(reason: String, next: String, sure: Option<String>) -> Answer {
     }
 }
 
+/// What to do about the gains of `model`, which may be any of the draws, and why.
 fn verdict(
-    identified: &Identified,
+    (model, draws): (&Model, &dyn Fn() -> Vec<Model>),
     choice: &Controllers,
     proposed: &Controller,
 ) -> (Advice, String) {
     let compared = choice.against.as_ref().and_then(|now| {
-        let (model, _) = identified.for_design(0);
-        let draws = identified.posterior.models(DRAWS);
-        Comparison::new(&model, &draws, [&now.controller, proposed], &choice.asked)
+        Comparison::new(model, &draws(), [&now.controller, proposed], &choice.asked)
     });
     match compared {
         Some(compared) if compared.pays() => (Advice::Change, words::compared(choice, &compared)),
@@ -252,15 +290,14 @@ fn between(now: &Pid, goal: &Pid, share: f64) -> Pid {
 }
 
 fn columns(
-    identified: &Identified,
+    model: &Model,
     choice: &Controllers,
     full: &Assessment,
     half: Option<&Controller>,
 ) -> Columns {
-    let (model, _) = identified.for_design(0);
     let noise = choice.asked.noise.as_ref();
     let now = choice.against.as_ref().and_then(|now| now.figures);
-    let half = half.and_then(|half| assess(&model, half, noise));
+    let half = half.and_then(|half| assess(model, half, noise));
     Columns {
         now: now.as_ref().map(Into::into),
         half: half.as_ref().map(Into::into),

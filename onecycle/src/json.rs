@@ -109,6 +109,7 @@ struct Amplitudes {
 #[derive(Serialize)]
 struct TuneReport<'a> {
     schema: &'static str,
+    answer: Answer,
     structure: &'static str,
     process: Parameters<Option<f64>>,
     controller: Controller,
@@ -373,6 +374,7 @@ fn design(of: &DesignReport) -> TuneReport<'_> {
     let metrics = figures(choice).and_then(|figures| figures.step.as_ref());
     TuneReport {
         schema: TUNE_SCHEMA,
+        answer: of.answer(),
         structure: model.structure().name(),
         process: Parameters::of_model(model),
         controller: of_style(design, choice.asked.style),

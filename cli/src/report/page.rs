@@ -12,11 +12,9 @@ mod step;
 mod structures;
 mod thin;
 
-use std::fmt::Write;
-
 use onecycle::{
-    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepMetrics,
-    StepResponse, load_response, step_response, with_signals,
+    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepResponse,
+    load_response, step_response, with_signals,
 };
 use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
@@ -164,24 +162,11 @@ struct Found {
 /// The page of a design. `oscillation`: what is known of the process, if its parameters are not.
 pub(crate) fn design(
     model: &Model,
-    (choice, design): (&Controllers, &Design),
+    (choice, design, answer): (&Controllers, &Design, &Answer),
     response: Option<&StepResponse>,
     oscillation: Option<&OfOscillation>,
 ) -> String {
-    let mut lead = made_by("tune");
-    let mut text = gains(choice, design);
-    let _ = write!(
-        text,
-        "phase margin {}",
-        stability::phase_margin(&design.margins, None)
-    );
-    text += &predicted(
-        choice
-            .design()
-            .and_then(|(_, figures)| figures.step)
-            .as_ref(),
-    );
-    lead += &page::verdict(true, &(text + "."));
+    let mut lead = made_by("tune") + &card::card(answer, None);
     lead += &page::facts(&match oscillation {
         Some(of) => parameters::of_family(model, of),
         None => parameters::of_model(model),
@@ -307,40 +292,6 @@ fn made_by(command: &str) -> String {
         "source",
         &format!("Made by onecycle {command}, onecycle {version}."),
     )
-}
-
-/// The style and the gains to type in.
-fn gains(choice: &Controllers, design: &Design) -> String {
-    let pid = design.controller.pid();
-    let gain = |name: &str, value: f64| {
-        if value == 0.0 {
-            String::new()
-        } else {
-            format!("{name} {}, ", significant(value))
-        }
-    };
-    let filter = gain("filter Tf", pid.filter_s).replace(", ", " s, ");
-    format!(
-        "{} {}: {}{}{}{filter}",
-        words::capital(words::controllers::style(choice.asked.style)),
-        design
-            .controller
-            .form()
-            .name()
-            .replace('_', " ")
-            .to_uppercase(),
-        gain("Kp", pid.kp),
-        gain("Ki", pid.ki),
-        gain("Kd", pid.kd),
-    )
-}
-
-/// The predicted step, as the end of a sentence.
-fn predicted(step: Option<&StepMetrics>) -> String {
-    step.map_or(String::new(), |step| {
-        let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
-        format!(", a step overshoots by {overshoot:.0} % and settles in {settled} s")
-    })
 }
 
 fn remarks(found: &Identification) -> Option<Section> {

@@ -239,3 +239,29 @@ fn help_lists_commands_and_exit_codes() {
     assert!(identify.contains("Exit codes: 0"), "{identify}");
     assert!(help(&["--version"]).stdout.starts_with("onecycle "));
 }
+
+// The answer comes first, as that of a recording; of an oscillation for all processes that agree.
+#[test]
+fn the_answer_comes_first() {
+    let verdict = |arguments: &[&str]| {
+        let outcome = run(&[&["tune"], arguments].concat());
+        let line = outcome.stdout.lines().nth(1).unwrap_or_default().to_owned();
+        let json = run(&[&["tune", "--json"], arguments].concat()).stdout;
+        let report: Value = serde_json::from_str(&json).unwrap();
+        (line, report["answer"]["verdict"].clone())
+    };
+    let process = ["--process", "FOPTD,K=1,T=2,tau=0.1"];
+    let (line, key) = verdict(&process);
+    assert!(
+        line.starts_with("FIRST GAINS: ") && key == "first_gains",
+        "{line} {key}"
+    );
+    let (line, key) = verdict(&[&process[..], &["--against", "2,0.5,0"]].concat());
+    assert!(
+        line.starts_with("CHANGE: ") && key == "change",
+        "{line} {key}"
+    );
+    let (line, key) = verdict(&["--ultimate-gain", "3", "--ultimate-period", "10"]);
+    let expected = "FIRST GAINS: the limits hold on 100 % of the processes that agree.";
+    assert!(line == expected && key == "first_gains", "{line} {key}");
+}

@@ -4,7 +4,7 @@ use crate::{Comparison, Effect, Felt, Identified, Parameter};
 use onecycle_design::Limit;
 
 use crate::results::answer::Advice;
-use crate::results::controllers::{Against, Controllers};
+use crate::results::controllers::{Against, Controllers, Source};
 use crate::results::log_gains::NamedFiles;
 use crate::words::number::{seconds, short};
 
@@ -137,8 +137,12 @@ pub fn not_kept(choice: &Controllers) -> Option<String> {
 pub fn first(choice: &Controllers) -> String {
     let robustness = choice.design().and_then(|(design, _)| design.robustness);
     robustness.map_or("no gains in force are known".to_owned(), |robustness| {
+        let which = match choice.source {
+            Source::Oscillation => "processes that agree",
+            _ => "likely processes",
+        };
         format!(
-            "the limits hold on {:.0} % of the likely processes",
+            "the limits hold on {:.0} % of the {which}",
             100.0 * robustness.coverage
         )
     })
