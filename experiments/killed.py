@@ -54,8 +54,8 @@ class Wrong(Exception):
     """A command that lost work, left a half-written file or gave other results."""
 
 
-def run(arguments, folder, **more):
-    return subprocess.run(["onecycle-lab", *arguments], cwd=folder, capture_output=True, text=True, check=False, **more)
+def run(arguments, folder):
+    return subprocess.run(["onecycle-lab", *arguments], cwd=folder, capture_output=True, text=True, check=False)
 
 
 def results(folder, names):

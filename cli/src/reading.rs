@@ -42,7 +42,7 @@ pub fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
 /// # Errors
 /// The error of opening. A folder is refused here, though systems open one.
 pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
-    let work = format!("reading {}", path.display());
+    let work = format!("reading {}", shown(path));
     let file = File::open(path)?;
     let about = file.metadata()?;
     if about.is_dir() {

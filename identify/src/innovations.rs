@@ -396,7 +396,7 @@ impl Search<'_> {
         // What the model lacks counts by what it does to the loop.
         let is_risky = |design: Design| {
             let theta = &fitted.best.found.theta;
-            let span_s = theta.lags_s().sum::<f64>() + theta.tau_s().max(0.0);
+            let span_s = theta.span_s();
             let taken =
                 || flexible::distance_taken(&fitted.record, span_s, &model, &design.controller);
             is_left_to_the_input(&tests) && taken() > MOST_TAKEN

@@ -75,20 +75,10 @@ pub(crate) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> A
         let next = error.map_or(String::new(), |error| sentence(&advice(error)));
         return not_yet(words::NO_DESIGN.to_owned(), next, Some(sure));
     };
-    let to_type = ToType::of(choice, &design.0.controller, subject);
     let (model, _) = identified.for_design(0);
     let draws = || identified.posterior.models(DRAWS);
-    let (verdict, reason) = verdict((&model, &draws), choice, &design.0.controller);
-    Answer {
-        verdict,
-        reason,
-        step: Some(subject.share),
-        figures: Some(columns(&model, choice, design.1, to_type.half.as_ref())),
-        sure: Some(sure),
-        watch: words::not_kept(choice),
-        next: next(verdict, subject, to_type.is_of_firmware),
-        gains: to_type.gains,
-    }
+    let designed = (choice, &design.0.controller, Some(design.1));
+    proposal((&model, &draws), designed, subject, Some(sure))
 }
 
 impl DesignReport {
@@ -103,26 +93,36 @@ impl DesignReport {
             gains: None,
             share: HALF_STEP,
         };
-        let to_type = ToType::of(&self.choice, &self.best.controller, &subject);
-        let members = || {
-            self.oscillation
-                .as_ref()
-                .map_or(vec![], |of| of.family.members.clone())
-        };
-        let (verdict, reason) =
-            verdict((&self.model, &members), &self.choice, &self.best.controller);
+        let family = self.oscillation.as_ref().map(|of| &of.family);
+        let members = || family.map_or(vec![], |family| family.members.clone());
         let full = self.choice.design().map(|(_, figures)| figures);
-        Answer {
-            verdict,
-            reason,
-            step: Some(subject.share),
-            figures: full
-                .map(|full| columns(&self.model, &self.choice, full, to_type.half.as_ref())),
-            sure: None,
-            watch: words::not_kept(&self.choice),
-            next: next(verdict, &subject, to_type.is_of_firmware),
-            gains: to_type.gains,
-        }
+        let designed = (&self.choice, &self.best.controller, full);
+        proposal((&self.model, &members), designed, &subject, None)
+    }
+}
+
+/// A process, and those that it may be instead.
+type Likely<'a> = (&'a Model, &'a dyn Fn() -> Vec<Model>);
+
+/// The answer with a controller, and its figures, for a process.
+fn proposal(
+    process: Likely<'_>,
+    (choice, controller, full): (&Controllers, &Controller, Option<&Assessment>),
+    subject: &Subject<'_>,
+    sure: Option<String>,
+) -> Answer {
+    let to_type = ToType::of(choice, controller, subject);
+    let (verdict, reason) = verdict(process, choice, controller);
+    let of_loops = |full| columns(process.0, choice, full, to_type.half.as_ref());
+    Answer {
+        verdict,
+        reason,
+        step: Some(subject.share),
+        figures: full.map(of_loops),
+        sure,
+        watch: words::not_kept(choice),
+        next: next(verdict, subject, to_type.is_of_firmware),
+        gains: to_type.gains,
     }
 }
 
@@ -134,9 +134,9 @@ fn not_yet(reason: String, next: String, sure: Option<String>) -> Answer {
     }
 }
 
-/// What to do about the gains of `model`, which may be any of the draws, and why.
+/// What to do about the gains, and why.
 fn verdict(
-    (model, draws): (&Model, &dyn Fn() -> Vec<Model>),
+    (model, draws): Likely<'_>,
     choice: &Controllers,
     proposed: &Controller,
 ) -> (Advice, String) {

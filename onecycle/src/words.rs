@@ -128,7 +128,7 @@ pub fn sentence(clause: &str) -> String {
 }
 
 /// With a capital letter at the start, unless that is the name of a file, as in `log.csv: ...`.
-pub fn capital(clause: &str) -> String {
+fn capital(clause: &str) -> String {
     let first = clause.split_whitespace().next().unwrap_or_default();
     if first.ends_with(':') && first.contains('.') {
         return clause.to_owned();

@@ -38,7 +38,7 @@ fn a_terminal_shows_them_as_text() {
     for path in [&path, &missing] {
         let command = ["identify", path, "--input", "3", "--output", "2"];
         let [text, error] = coloured(&command, Some("CLICOLOR_FORCE"));
-        // A code that is not one of colours is a panic there.
+        // `stripped` panics at a code that does not set a colour.
         let told = stripped(&text) + &stripped(&error);
         let line = told.lines().find(|line| line.contains("onerror=alert(1)>"));
         assert!(line.is_some_and(|line| line.contains("\"'&")), "{told}");

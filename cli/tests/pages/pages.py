@@ -321,7 +321,7 @@ def check(browser, told, name, path, program, command, sections, plots):
             print_out(page)
         unfold(page)
         look(page, path, sections, plots)
-        # Once each, as they are the same at both widths and take seconds: the stricter width for the one, the mouse's for the other.
+        # Axe and the themes take seconds each and say the same at both widths: axe runs on the phone, where it is stricter.
         if screen == "phone" and ("recording" in sections or name == "flight"):
             accessible(page)
         if told.picture and (name, screen) == ("hover", "desk"):

@@ -34,8 +34,8 @@ const HIGHEST: f64 = 0.6;
 /// Deviations of the response that are not held against the model.
 const DEVIATIONS: f64 = 2.0;
 
-/// For a process whose lags and dead time last `span_s`: largest share of the distance from instability, `|1 + C M|`, that the difference of the two responses takes for certain. Zero if the
-/// record is too short to tell.
+/// Largest share of the distance from instability, `|1 + C M|`, that the difference of the two responses takes for certain, of a
+/// process whose lags and dead time last `span_s`. Zero if the record is too short to tell, or its rows are uneven.
 pub(super) fn distance_taken(
     record: &Record,
     span_s: f64,
@@ -43,7 +43,7 @@ pub(super) fn distance_taken(
     controller: &Controller,
 ) -> f64 {
     let found = Flexible::of(record, span_s).map(|flexible| {
-        let taken = flexible.frequencies().map(|omega| {
+        let taken = flexible.frequencies().into_iter().map(|omega| {
             let (response, deviation) = flexible.response(omega);
             let (c, m) = (
                 controller.frequency_response(omega),
@@ -68,7 +68,7 @@ struct Flexible {
     coefficients: Vec<f64>,
     /// First lag of the input.
     first: usize,
-    /// Standard deviation of what is left.
+    /// Standard deviation of the part of the output that the prediction does not explain.
     deviation: f64,
 }
 
@@ -77,6 +77,9 @@ impl Flexible {
         let most = (record.len() / FEWEST).max(1);
         let samples = ((span_s / ROWS / record.dt_s).round() as usize).clamp(1, most);
         let (coarse, _) = search::coarse(record, samples);
+        if !coarse.uneven_s.is_empty() {
+            return None;
+        }
         let blocks = Blocks::new(&coarse, 1, 0.0);
         let inputs = blocks.mean_inputs();
         let outputs: Vec<Option<f64>> = (0..blocks.len())
@@ -87,15 +90,13 @@ impl Flexible {
             .filter(|row| outputs[row - LAGS..=*row].iter().all(Option::is_some))
             .collect();
         let output = |row: usize| outputs[row].unwrap_or(0.0);
-        let column =
-            |value: &dyn Fn(usize) -> f64| validate::centred(rows.iter().map(|row| value(*row)));
-        let past = (1..=LAGS).map(|lag| column(&|row| output(row - lag)));
-        let of_input = (first..=LAGS).map(|lag| column(&|row| inputs[row - lag]));
-        let columns: Vec<Vec<f64>> = past.chain(of_input).collect();
+        let mut columns = validate::lagged(&rows, 1..=LAGS, output);
+        columns.extend(validate::lagged(&rows, first..=LAGS, |row| inputs[row]));
+        let target = validate::centred(rows.iter().map(|row| output(*row)));
         let freedom = rows.len().checked_sub(columns.len());
         let freedom = freedom.filter(|freedom| *freedom >= LAGS)?;
         let columns = Orthogonal::new(&columns)?;
-        let (rest, coefficients) = columns.solve(&column(&output));
+        let (rest, coefficients) = columns.solve(&target);
         let square = rest.iter().map(|e| e * e).sum::<f64>() / freedom as f64;
         Some(Self {
             row_s: coarse.dt_s,
@@ -111,10 +112,9 @@ impl Flexible {
         })
     }
 
-    fn frequencies(&self) -> impl Iterator<Item = f64> {
-        let (lowest, highest) = (2.0 * PI / self.length_s, HIGHEST * PI / self.row_s);
-        (0..FREQUENCIES)
-            .map(move |k| lowest * (highest / lowest).powf(k as f64 / (FREQUENCIES - 1) as f64))
+    fn frequencies(&self) -> Vec<f64> {
+        let ends = [2.0 * PI / self.length_s, HIGHEST * PI / self.row_s];
+        validate::spaced(ends, FREQUENCIES)
     }
 
     /// Frequency response, and its standard deviation: that of its linear part in the coefficients.

@@ -187,6 +187,11 @@ impl Theta {
         self.lags_s().fold(f64::INFINITY, f64::min)
     }
 
+    /// Time (s) that the lags and the dead time last.
+    pub(super) fn span_s(&self) -> f64 {
+        self.lags_s().sum::<f64>() + self.tau_s().max(0.0)
+    }
+
     /// Lags and inverses of the poles (s), without integrators.
     pub(super) fn lags_s(&self) -> impl Iterator<Item = f64> {
         let layout = self.layout();

@@ -66,9 +66,8 @@ pub(super) fn tests_above(floor: f64, blocks: &Blocks<'_>, at: &Evaluation) -> I
 
 /// Whether what was found under feedback is the controller, read backwards: it has neither a dead time nor a lag of a sample.
 pub(super) fn is_of_controller(blocks: &Blocks<'_>, theta: &Theta) -> bool {
-    let all_s: f64 = theta.lags_s().sum::<f64>() + theta.tau_s().max(0.0);
     let comes_to_rest = theta.structure.stages().integrators == 0;
-    comes_to_rest && all_s < blocks.record.dt_s && follows(blocks)
+    comes_to_rest && theta.span_s() < blocks.record.dt_s && follows(blocks)
 }
 
 /// Share of the innovations that later inputs explain beyond earlier ones, where chance does not: the input was logged late. Under feedback
@@ -87,10 +86,11 @@ pub(super) fn leads(blocks: &Blocks<'_>, at: &Evaluation) -> Option<f64> {
         return None;
     }
     let target = centred(used.iter().map(|(_, e)| *e));
-    let column = |place: usize| centred(used.iter().map(|(row, _)| inputs[row + place - LAGS]));
+    let last: Vec<usize> = used.iter().map(|(row, _)| row + LEADS).collect();
+    let before_last = |lags| lagged(&last, lags, |row| inputs[row]);
     // Those of the same block are earlier ones: an input that switched between two samples is logged with the later one.
-    let earlier: Vec<Vec<f64>> = (1..=LAGS).map(column).collect();
-    let later: Vec<Vec<f64>> = (LAGS + 1..=LAGS + LEADS).map(column).collect();
+    let earlier = before_last((LEADS..LEADS + LAGS).rev());
+    let later = before_last((0..LEADS).rev());
     let least = blocks.record.floor.powi(2) / at.variance * count;
     let (share, f) = explained_beyond(&target, &earlier, &later, least)?;
     let is_late = share > ANOTHER_KIND.0 && f > ANOTHER_KIND.1;
@@ -130,9 +130,8 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) 
         return (0.0, 0.0);
     }
     let target = centred(used.iter().map(|(_, e)| *e));
-    let columns: Vec<Vec<f64>> = (1..=LAGS)
-        .map(|lag| centred(used.iter().map(|(row, _)| inputs[row - lag])))
-        .collect();
+    let rows: Vec<usize> = used.iter().map(|(row, _)| *row).collect();
+    let columns = lagged(&rows, 1..=LAGS, |row| inputs[row]);
     // A lag that repeats those before it (a slow input) tells nothing new.
     let orthogonal = Orthogonal::independent(&columns);
     let (rest, _) = orthogonal.solve(&target);
@@ -144,6 +143,16 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) 
     // What the input explains counts where its mean square is above the variance that is believed.
     let counts = all - rest > count * least;
     (1.0 - rest / all, if counts { f } else { f.min(1.0) })
+}
+
+/// A column for each lag: the values at so many rows before each of `rows`, less their mean.
+pub(super) fn lagged(
+    rows: &[usize],
+    lags: impl IntoIterator<Item = usize>,
+    value: impl Fn(usize) -> f64,
+) -> Vec<Vec<f64>> {
+    let column = |lag: usize| centred(rows.iter().map(|row| value(row - lag)));
+    lags.into_iter().map(column).collect()
 }
 
 /// Values less their mean.
@@ -185,17 +194,12 @@ fn follows(blocks: &Blocks<'_>) -> bool {
     let outputs: Vec<f64> = (0..blocks.len())
         .map(|block| blocks.mean_output(block).unwrap_or(0.0))
         .collect();
-    let rows = LAGS..blocks.len();
-    let count = rows.len() as f64;
-    if count < 4.0 * LAGS as f64 {
+    let rows: Vec<usize> = (LAGS..blocks.len()).collect();
+    if rows.len() < 4 * LAGS {
         return false;
     }
-    let target = centred(rows.clone().map(|row| inputs[row]));
-    let of_past = |values: &[f64]| -> Vec<Vec<f64>> {
-        (1..=LAGS)
-            .map(|lag| centred(rows.clone().map(|row| values[row - lag])))
-            .collect()
-    };
+    let target = centred(rows.iter().map(|row| inputs[*row]));
+    let of_past = |values: &[f64]| lagged(&rows, 1..=LAGS, |row| values[row]);
     let explained = explained_beyond(&target, &of_past(&inputs), &of_past(&outputs), 0.0);
     explained.is_some_and(|(_, f)| f > FED_BACK)
 }
@@ -414,6 +418,14 @@ fn variance(rows: &[f64]) -> f64 {
     rows.iter().map(|row| (row - mean).powi(2)).sum::<f64>() / rows.len() as f64
 }
 
+/// So many frequencies at equal ratios, with both ends.
+pub(super) fn spaced([lowest, highest]: [f64; 2], count: usize) -> Vec<f64> {
+    let share = |i: usize| i as f64 / (count - 1) as f64;
+    (0..count)
+        .map(|i| lowest * (highest / lowest).powf(share(i)))
+        .collect()
+}
+
 /// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` about their mean lie. `None` without power.
 fn quantiles(rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
     quantiles_about(mean(rows), rows, row_s)
@@ -422,14 +434,12 @@ fn quantiles(rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
 /// The same about another value.
 fn quantiles_about(middle: f64, rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
     let length_s = row_s * rows.len() as f64;
-    let (lowest, highest) = (TAU / length_s, PI / row_s);
-    let frequency =
-        |i: usize| lowest * (highest / lowest).powf(i as f64 / (FREQUENCIES - 1) as f64);
+    let frequencies = spaced([TAU / length_s, PI / row_s], FREQUENCIES);
     let rows: Vec<f64> = rows.iter().map(|value| value - middle).collect();
     let power = |omega: f64| power(&rows, omega * row_s);
     // On a logarithmic grid a frequency stands for a band as wide as itself.
-    let powers: Vec<f64> = (0..FREQUENCIES)
-        .map(|i| power(frequency(i)) * frequency(i))
+    let powers: Vec<f64> = (frequencies.iter())
+        .map(|omega| power(*omega) * omega)
         .collect();
     let total: f64 = powers.iter().sum();
     let quantile = |part: f64| {
@@ -438,7 +448,7 @@ fn quantiles_about(middle: f64, rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
             sum += power;
             sum >= part * total
         });
-        frequency(index.unwrap_or(FREQUENCIES - 1))
+        frequencies[index.unwrap_or(FREQUENCIES - 1)]
     };
     (total > 0.0 && total.is_finite()).then(|| [0.05, 0.5, 0.95].map(quantile))
 }

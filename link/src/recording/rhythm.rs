@@ -26,7 +26,8 @@ impl Rhythm {
     ///
     /// Where the increments differ, as in a log that stores changes, a long one is no gap: those above the median are taken
     /// as exponential, and then `P(increment > median + scale x) = exp(-x) / 2`. The longest quarter begins `ln 2` scales
-    /// above the median, the longest tenth `ln 5`; of samples and pauses, either may say that there is no scale.
+    /// above the median, the longest tenth `ln 5`. The smaller of the two scales counts: in a log of even rows with
+    /// pauses, which are gaps, one of them is zero.
     pub(super) fn around_median(mut increments_s: Vec<f64>) -> Self {
         let count = increments_s.len();
         let mut with_longer = |longer: usize| match count.saturating_sub(1 + longer) {
