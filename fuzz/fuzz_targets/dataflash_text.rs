@@ -1,6 +1,5 @@
+//! `cargo +nightly fuzz run --features libfuzzer dataflash_text`, from the root.
+
 #![no_main]
 
-#[path = "../src/targets.rs"]
-mod targets;
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| targets::dataflash_text(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| onecycle_fuzz::run("dataflash_text", bytes));

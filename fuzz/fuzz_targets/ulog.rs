@@ -1,6 +1,5 @@
+//! `cargo +nightly fuzz run --features libfuzzer ulog`, from the root.
+
 #![no_main]
 
-#[path = "../src/targets.rs"]
-mod targets;
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| targets::ulog(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| onecycle_fuzz::run("ulog", bytes));

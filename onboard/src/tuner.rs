@@ -113,8 +113,8 @@ impl<'a> Tuner<'a> {
         })
     }
 
-    /// One tick. Takes time (s), measurement and reference (output unit); returns the input to hold until the
-    /// next tick (input unit), which is always finite and within the limits.
+    /// One tick. Takes time (s), measurement and reference (output unit); returns the input to hold until the next tick (input
+    /// unit), which is always finite, and within the limits if it is the tuner's own ([`TunerCore::is_in_charge`]).
     #[inline]
     pub fn step(&mut self, time_s: f64, measurement: &Measurement, reference: f32) -> f32 {
         (self.core).tick(Some(&mut self.desk), time_s, measurement, reference);

@@ -31,6 +31,16 @@ trim = true
 SMALL = {
     "relay": 'measure = "relay"\ncases = 9\nseed = 3\nbias = 0.3\nsigma = 0.02\ntrim = true\n',
     "unknown": 'measure = "unknown"\ncases = 1\nseed = 3\nbias = 0.3\nsigma = 0.02\ntrim = true\n',
+    "honesty": """measure = "honesty"
+cases = 1
+seed = 1
+noise = 0.005
+bias = 0.2
+periods = 20
+samples_per_period = 100
+process = { structure = "soiptd", k_over_t_body = 1, t_prop_s = 0.05, t_body_s = 1, tau_s = 0.03 }
+kinds = [{ name = "right", control = true }, { name = "wrong sign", fault = "wrong_sign", named_by = ["negative_gain"] }]
+""",
 }
 
 
@@ -134,12 +144,18 @@ def test_a_finished_campaign_is_extended(recipe, tmp_path, client):
     assert sorted(pandas.read_parquet(out)["n"]) == list(range(24))
     # Fewer again are there already.
     assert str(onecycle.campaign(recipe, client=client, out=out, cases=6)) == str(few)
-    # Where the kind of a case depends on their number, nothing can be added.
-    (tmp_path / "unknown.toml").write_text(SMALL["relay"].replace("relay", "unknown"))
+
+
+@pytest.mark.parametrize("name", ["unknown", "honesty"])
+def test_kinds_take_turns_so_that_their_campaigns_are_extended_too(name, tmp_path):
+    (tmp_path / "campaign.toml").write_text(SMALL[name])
     from onecycle_lab import Campaign
 
-    one, other = (Campaign(str(tmp_path / "unknown.toml"), [f"--cases={n}"]).settings() for n in (1, 2))
-    assert one != other
+    one, two = (Campaign(str(tmp_path / "campaign.toml"), [f"--cases={n}"]) for n in (1, 2))
+    assert one.settings() == two.settings() and len(two) == 2 * len(one)
+    assert two.cases(0, len(one)) == one.cases(0, len(one))
+    kinds = [json.loads(truth)["kind"] for _, truth in two.cases(0, len(two))]
+    assert kinds[len(one):] == kinds[:len(one)] and len(set(kinds)) > 1
 
 
 def test_truth_is_beside_the_outcome(recipe, tmp_path, client):
@@ -234,18 +250,11 @@ def test_a_lost_scheduler_is_a_sentence(recipe, tmp_path):
 
 @pytest.mark.parametrize("measure", ["relay", "unknown", "recording", "honesty"])
 def test_every_measure_gives_the_table_of_the_program(measure, tmp_path, client):
-    path = tmp_path / "campaign.toml"
+    path, options = tmp_path / "campaign.toml", {}
     if measure in SMALL:
         path.write_text(SMALL[measure])
-        options = {}
     else:
-        path = ROOT / "experiments" / {"recording": "any_open.toml", "honesty": "honesty.toml"}[measure]
-        options = {"cases": 4 if measure == "recording" else 1}
-    if measure == "honesty":
-        # The first kinds are enough.
-        head, *kinds = path.read_text().split("[[kinds]]\n")
-        path = tmp_path / "campaign.toml"
-        path.write_text("[[kinds]]\n".join([head] + kinds[:5]))
+        path, options = ROOT / "experiments/any_open.toml", {"cases": 4}
     words = [f"--{key}={value}" for key, value in options.items()]
     # All three at a time: of the unknown processes one takes as long as all others.
     with ThreadPoolExecutor() as pool:

@@ -3,6 +3,7 @@
 mod card;
 mod controller;
 mod fit;
+#[cfg(feature = "program")]
 mod flight;
 mod overlay;
 mod parameters;
@@ -19,6 +20,7 @@ use onecycle::{
 use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
 
+#[cfg(feature = "program")]
 pub(crate) use self::flight::flight;
 use self::stability::Loop;
 use super::number::significant;

@@ -4,7 +4,6 @@ mod averaging;
 mod awkward;
 mod dialects;
 mod flight_logs;
-mod fuzz_targets;
 mod hostile;
 mod instruments;
 #[cfg(feature = "matlab")]

@@ -43,15 +43,12 @@ impl Campaign {
         read().map_err(|failure: Failure| failure.to_string())
     }
 
-    /// All that decides the outcome of a case, as JSON. The number of cases is among it only where the kind of a case depends on it:
-    /// any other campaign can be extended.
+    /// All that decides the outcome of a case, as JSON. The number of cases is not among it: a campaign can be extended.
     #[must_use]
     pub fn settings(&self) -> String {
         let mut settings = self.settings.clone();
-        if self.plan.is_extensible() {
-            settings["cases"] = Value::Null;
-            settings["file"]["cases"] = Value::Null;
-        }
+        settings["cases"] = Value::Null;
+        settings["file"]["cases"] = Value::Null;
         settings.to_string()
     }
 

@@ -4,9 +4,7 @@ use crate::pages::page;
 use crate::pages::plot::Figure;
 use crate::report::answer::{LOAD, cells, rows};
 use crate::results::answer::{Advice, Answer, Gain};
-use crate::results::flight::FlightLoop;
 use crate::words::answer as words;
-use crate::words::flight::title;
 
 /// The card, with the responses beside it.
 pub(super) fn card(answer: &Answer, figure: Option<&Figure>) -> String {
@@ -25,18 +23,6 @@ pub(super) fn card(answer: &Answer, figure: Option<&Figure>) -> String {
         Some(figure) => page::beside(&text, &page::figure(figure)),
         None => text,
     }
-}
-
-/// A loop on the card of its flight. `id`: where all else is told of it.
-pub(super) fn brief(id: &str, one: &FlightLoop, answer: &Answer) -> String {
-    let is_good = answer.verdict != Advice::NotYet;
-    let verdict = words::headline(answer.verdict, &answer.reason);
-    let mut text =
-        page::heading_to(id, &title(one.control_loop)) + &page::verdict(is_good, &verdict);
-    if matches!(answer.verdict, Advice::Change | Advice::FirstGains) {
-        text += &gains(answer);
-    }
-    text
 }
 
 /// A button that copies the gains to type in: this share of the step where some are in force.
@@ -64,7 +50,7 @@ pub(super) fn copy(answers: &[&Answer]) -> String {
     }
 }
 
-fn gains(answer: &Answer) -> String {
+pub(super) fn gains(answer: &Answer) -> String {
     let Some(figures) = &answer.figures else {
         return String::new();
     };

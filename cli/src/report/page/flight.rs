@@ -3,7 +3,7 @@
 use super::{Subject, card, made_by};
 use crate::pages::page::{self, Tab};
 use crate::report::flight::next;
-use crate::results::answer::Answer;
+use crate::results::answer::{Advice, Answer};
 use crate::results::flight::{FlightLoop, Survey};
 use crate::words::answer as answers;
 use crate::words::flight as words;
@@ -20,7 +20,7 @@ pub(crate) fn flight(of: &Survey) -> String {
     overview += &card::copy(&all);
     let cards = told
         .iter()
-        .map(|(one, answer)| card::brief(&id(one), one, answer));
+        .map(|(one, answer)| brief(&id(one), one, answer));
     overview += &page::cards(&cards.collect::<Vec<_>>());
     let first = Tab {
         id: "flight".to_owned(),
@@ -33,6 +33,18 @@ pub(crate) fn flight(of: &Survey) -> String {
         &title,
         &(page::tabs("Loops of the flight", &tabs) + &made_by("identify")),
     )
+}
+
+/// A loop on the card of its flight. `id`: where all else is told of it.
+fn brief(id: &str, one: &FlightLoop, answer: &Answer) -> String {
+    let is_good = answer.verdict != Advice::NotYet;
+    let verdict = answers::headline(answer.verdict, &answer.reason);
+    let mut text =
+        page::heading_to(id, &words::title(one.control_loop)) + &page::verdict(is_good, &verdict);
+    if matches!(answer.verdict, Advice::Change | Advice::FirstGains) {
+        text += &card::gains(answer);
+    }
+    text
 }
 
 fn tab(one: &FlightLoop, answer: &Answer) -> Tab {

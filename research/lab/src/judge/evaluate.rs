@@ -39,7 +39,6 @@
 
 pub mod contender;
 pub mod files;
-#[cfg(feature = "parquet")]
 pub mod parquet;
 pub mod summary;
 

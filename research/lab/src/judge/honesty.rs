@@ -102,6 +102,17 @@ pub enum Broken {
     },
 }
 
+impl HonestyOutcome {
+    /// What was accepted.
+    #[must_use]
+    pub fn accepted(&self) -> Option<&Accepted> {
+        match self {
+            Self::Accepted(accepted) => Some(accepted),
+            _ => None,
+        }
+    }
+}
+
 impl Accepted {
     /// Whether the loop with the real plant is unstable.
     #[must_use]

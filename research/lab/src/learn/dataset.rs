@@ -27,7 +27,6 @@
 //! [`Batch`]: crate::learn::train::Batch
 
 pub mod learning;
-#[cfg(feature = "parquet")]
 pub mod parquet;
 mod sensitivity;
 pub mod shards;

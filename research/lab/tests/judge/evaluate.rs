@@ -459,7 +459,6 @@ fn wrong_truths_name_their_line() {
 }
 
 // Two recordings, one row group each, read by the crate that wrote them: every number to the last bit.
-#[cfg(feature = "parquet")]
 #[test]
 fn parquet_has_the_recordings() {
     use onecycle_lab::judge::evaluate::parquet::Writer;

@@ -184,7 +184,6 @@ fn a_dataset_grows() {
 // Written in three lots of 3, 0 and the remaining rows. 2 whole numbers, 34 inputs, 3 times 4 and 6
 // single columns make 54 columns. Read by the crate that wrote them, not by the code under test: every
 // number to the last bit.
-#[cfg(feature = "parquet")]
 #[test]
 fn parquet_has_the_records() {
     use onecycle_lab::learn::dataset::parquet::Writer;
@@ -218,7 +217,6 @@ fn parquet_has_the_records() {
 }
 
 /// The columns of a record, in order.
-#[cfg(feature = "parquet")]
 fn parquet_row(record: &ExampleRecord) -> Vec<(String, parquet::record::Field)> {
     use parquet::record::Field;
     let whole = |name: &str, x: u64| vec![(name.to_owned(), Field::ULong(x))];

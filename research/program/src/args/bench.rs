@@ -35,7 +35,7 @@ pub(crate) enum BenchAction {
 pub(crate) enum Format {
     /// One file for each experiment
     Csv,
-    /// One file for all experiments [needs a build with --features parquet]
+    /// One file for all experiments
     Parquet,
 }
 

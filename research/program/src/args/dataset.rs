@@ -41,7 +41,7 @@ pub(crate) struct Dataset {
     /// Without effect: interrupted runs are always resumed
     #[arg(long = "resume", hide = true)]
     _resume: bool,
-    /// Also write all examples to this Parquet file [needs a build with --features parquet]
+    /// Also write all examples to this Parquet file
     #[arg(long, value_name = "FILE")]
     pub(crate) parquet: Option<PathBuf>,
     /// Number of threads [default: one for each core]

@@ -19,11 +19,6 @@ use crate::workers::{Lot, Workers};
 use crate::{report, settings};
 
 pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
-    if arguments.parquet.is_some() && !cfg!(feature = "parquet") {
-        return Err(Failure::usage(
-            "this build cannot write Parquet: build with cargo build --release --features parquet",
-        ));
-    }
     if let Some(path) = &arguments.recipe
         && classifier::is_recipe(path)?
     {
@@ -40,7 +35,6 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
         &workers,
     )?;
     workers.finish();
-    #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
         let _waiting = Waiting::on(format!("writing {}", path.display()));
         folder.write_parquet(path)?;

@@ -336,7 +336,6 @@ fn traces_are_recordings() {
 
 // The same experiments in one Parquet file give the same results except for the times. A file that is not Parquet, or
 // lacks an experiment, is refused.
-#[cfg(feature = "parquet")]
 #[test]
 fn a_parquet_folder_gives_the_same_results() {
     let folder = Scratch::new();
@@ -419,11 +418,7 @@ fn wrong_folders_are_refused() {
         (
             "benchmark.json",
             manifest.replace("\"csv\"", "\"parquet\""),
-            vec![if cfg!(feature = "parquet") {
-                "recordings.parquet"
-            } else {
-                "--format csv"
-            }],
+            vec!["recordings.parquet"],
         ),
         (
             "benchmark.json",

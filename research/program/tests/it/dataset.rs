@@ -191,7 +191,6 @@ fn stopped(arguments: &[&str], folder: &Path) {
 // ---------------------------------------------------------------- Parquet
 
 // Two files with about 4200 rows: the records of the first, then of the second.
-#[cfg(feature = "parquet")]
 #[test]
 fn one_parquet_file_of_all() {
     use onecycle_lab::learn::dataset::parquet::Writer;
@@ -223,20 +222,6 @@ fn one_parquet_file_of_all() {
     let nowhere = folder.name("nowhere/all.parquet");
     let outcome = run(&[&["dataset"], &arguments[..], &[&nowhere]].concat());
     outcome.refused(NOT_WRITTEN, &["nowhere/all.parquet"]);
-}
-
-// Without the feature the message says how to build with it, before any simulation.
-#[cfg(not(feature = "parquet"))]
-#[test]
-fn no_parquet_without_its_feature() {
-    let folder = Scratch::new();
-    let (into, table) = (folder.name("into"), folder.name("all.parquet"));
-    let outcome = run(&["dataset", "-n", "2", "--into", &into, "--parquet", &table]);
-    outcome.misused(&[
-        "cannot write Parquet",
-        "cargo build --release --features parquet",
-    ]);
-    assert_eq!(folder.files(), Vec::<String>::new());
 }
 
 // ---------------------------------------------------------------- refusals

@@ -22,7 +22,6 @@ pub(super) const MANIFEST: &str = "benchmark.json";
 pub(super) const TRUTH: &str = "truth.csv";
 pub(super) const RULES: &str = "README.md";
 pub(super) const RECORDINGS: &str = "recordings";
-#[cfg(feature = "parquet")]
 pub(super) const PARQUET: &str = "recordings.parquet";
 
 /// The file of an experiment.

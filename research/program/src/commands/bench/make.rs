@@ -20,11 +20,6 @@ use crate::workers::Workers;
 const MOST_SIGMA: f64 = 0.2;
 
 pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
-    if arguments.format == Format::Parquet && !cfg!(feature = "parquet") {
-        return Err(Failure::usage(
-            "this build cannot write Parquet: build with cargo build --release --features parquet",
-        ));
-    }
     if !(0.0..=MOST_SIGMA).contains(&arguments.sigma) {
         return Err(Failure::usage(format!(
             "--sigma {} is not between 0 and {MOST_SIGMA}",
@@ -46,10 +41,7 @@ pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     folder::write_whole(out, |staged| {
         let truths = match arguments.format {
             Format::Csv => write_recordings(staged, &manifest.benchmark, &workers)?,
-            #[cfg(feature = "parquet")]
             Format::Parquet => write_table(staged, &manifest.benchmark, &workers)?,
-            #[cfg(not(feature = "parquet"))]
-            Format::Parquet => Vec::new(),
         };
         workers.finish();
         let files = [
@@ -98,11 +90,9 @@ fn write_recordings(
 }
 
 /// Number of experiments in memory at a time.
-#[cfg(feature = "parquet")]
 const LOT: usize = 64;
 
 /// Writes one file with a row group for each experiment.
-#[cfg(feature = "parquet")]
 fn write_table(
     folder: &Path,
     benchmark: &Benchmark,

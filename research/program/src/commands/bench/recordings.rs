@@ -15,7 +15,6 @@ pub(super) enum Recordings {
     /// One file for each experiment, in this folder.
     Csv(PathBuf),
     /// One file for all experiments.
-    #[cfg(feature = "parquet")]
     Parquet(table::Table),
 }
 
@@ -24,16 +23,7 @@ impl Recordings {
     pub(super) fn open(folder: &Path, manifest: &BenchManifest) -> Result<Self, Failure> {
         match manifest.recordings {
             RecordingFormat::Csv => Ok(Self::Csv(folder.to_owned())),
-            #[cfg(feature = "parquet")]
             RecordingFormat::Parquet => table::Table::open(folder).map(Self::Parquet),
-            #[cfg(not(feature = "parquet"))]
-            RecordingFormat::Parquet => Err(Failure::unreadable(
-                &folder.join(super::folder::MANIFEST),
-                "this build cannot read Parquet: build with cargo build --release --features parquet, make \
-                 the folder with --format csv (the same seed gives the same experiments), or score \
-                 answers only with --methods none"
-                    .to_owned(),
-            )),
         }
     }
 
@@ -49,13 +39,11 @@ impl Recordings {
                 workers.quietly(numbers.len(), read).into_iter().collect()
             }
             // One at a time: threads would share the position in the file.
-            #[cfg(feature = "parquet")]
             Self::Parquet(table) => numbers.iter().map(|&number| table.read(number)).collect(),
         }
     }
 }
 
-#[cfg(feature = "parquet")]
 mod table {
     use std::fs::File;
     use std::path::{Path, PathBuf};

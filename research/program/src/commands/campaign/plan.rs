@@ -35,11 +35,6 @@ trait Plan: Send + Sync {
     /// Number of cases.
     fn count(&self) -> u64;
 
-    /// Whether case `n` is the same for any number of cases.
-    fn is_extensible(&self) -> bool {
-        true
-    }
-
     /// Simulates and judges case `n`: its outcome and its truth.
     fn case(&self, n: u64) -> Result<(Self::Case, Value), Failure>;
 
@@ -60,9 +55,6 @@ pub(crate) trait Shared: Send + Sync {
     /// Number of cases.
     fn count(&self) -> u64;
 
-    /// Whether case `n` is the same for any number of cases.
-    fn is_extensible(&self) -> bool;
-
     /// The outcome of case `n` and its truth, each as JSON on one line.
     fn line(&self, n: u64) -> Result<[String; 2], Failure>;
 
@@ -80,10 +72,6 @@ pub(crate) trait Shared: Send + Sync {
 impl<P: Plan> Shared for P {
     fn count(&self) -> u64 {
         Plan::count(self)
-    }
-
-    fn is_extensible(&self) -> bool {
-        Plan::is_extensible(self)
     }
 
     fn line(&self, n: u64) -> Result<[String; 2], Failure> {
@@ -300,6 +288,9 @@ struct Unknown {
 }
 
 impl Unknown {
+    /// Cases in which every kind has had its turn.
+    const ROUND: u64 = IN_FAMILY + DefectKind::OUTSIDE.len() as u64;
+
     fn new(campaign: Campaign, file: &Path) -> Result<Self, Failure> {
         let recipe = campaign.recipe();
         recipe
@@ -316,14 +307,12 @@ impl Unknown {
         })
     }
 
-    /// Kind of case `n`, and its number among those of the kind.
+    /// Kind of case `n`, and its number among those of the kind. The kinds take turns: case `n` is the same for any number of cases.
     fn kind(&self, n: u64) -> (DefectKind, u64) {
-        match n.checked_sub(IN_FAMILY * self.campaign.cases) {
-            None => (DefectKind::InFamily, n),
-            Some(beyond) => {
-                let kind = (beyond / self.campaign.cases) as usize;
-                (DefectKind::OUTSIDE[kind], beyond % self.campaign.cases)
-            }
+        let (round, turn) = (n / Self::ROUND, n % Self::ROUND);
+        match turn.checked_sub(IN_FAMILY) {
+            None => (DefectKind::InFamily, IN_FAMILY * round + turn),
+            Some(kind) => (DefectKind::OUTSIDE[kind as usize], round),
         }
     }
 
@@ -353,12 +342,7 @@ impl Plan for Unknown {
     type Case = Option<OutsiderCase>;
 
     fn count(&self) -> u64 {
-        (IN_FAMILY + DefectKind::OUTSIDE.len() as u64) * self.campaign.cases
-    }
-
-    /// Those of a kind follow each other.
-    fn is_extensible(&self) -> bool {
-        false
+        Self::ROUND * self.campaign.cases
     }
 
     fn case(&self, n: u64) -> Result<(Option<OutsiderCase>, Value), Failure> {
@@ -441,7 +425,9 @@ struct WrongData(HonestyCampaign, PathBuf);
 impl WrongData {
     /// The recording, unless its output runs away, and its truth.
     fn record(&self, n: u64) -> Result<(Option<FaultyRecording>, Value), Failure> {
-        let (kind, n) = ((n / self.0.cases) as usize, n % self.0.cases);
+        // The kinds take turns: case `n` is the same for any number of cases.
+        let kinds = self.0.kinds.len() as u64;
+        let (kind, n) = ((n % kinds) as usize, n / kinds);
         let recording = self.0.record(kind, n);
         let recording = recording.map_err(|error| Failure::unreadable(&self.1, error))?;
         let of = |recording: &FaultyRecording| {
@@ -463,11 +449,6 @@ impl Plan for WrongData {
 
     fn count(&self) -> u64 {
         self.0.cases * self.0.kinds.len() as u64
-    }
-
-    /// Those of a kind follow each other.
-    fn is_extensible(&self) -> bool {
-        false
     }
 
     fn case(&self, n: u64) -> Result<(HonestyOutcome, Value), Failure> {

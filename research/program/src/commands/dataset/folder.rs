@@ -121,7 +121,6 @@ impl Folder {
     }
 
     /// Writes the experiments of all files to one Parquet file, one file at a time.
-    #[cfg(feature = "parquet")]
     pub(super) fn write_parquet(&self, to: &Path) -> Result<(), Failure> {
         use onecycle_lab::learn::dataset::parquet::Writer;
         write_file(to, |file| {

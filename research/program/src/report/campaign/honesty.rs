@@ -28,16 +28,17 @@ pub(crate) fn named<'a>(
     outcomes: &'a [HonestyOutcome],
 ) -> Vec<Named<'a>> {
     let of_kind = |(kind, outcomes): OfKind<'a>| {
-        let is_named = |outcome: &HonestyOutcome| matches!(outcome, HonestyOutcome::Accepted(found) if found.is_named(&kind.named_by));
-        outcomes
-            .iter()
-            .enumerate()
-            .map(move |(case, outcome)| Named {
-                kind: &kind.name,
-                case,
-                is_named: is_named(outcome),
-                outcome,
-            })
+        let is_named = |outcome: &HonestyOutcome| {
+            outcome
+                .accepted()
+                .is_some_and(|of| of.is_named(&kind.named_by))
+        };
+        (outcomes.into_iter().enumerate()).map(move |(case, outcome)| Named {
+            kind: &kind.name,
+            case,
+            is_named: is_named(outcome),
+            outcome,
+        })
     };
     kinds(campaign, outcomes).flat_map(of_kind).collect()
 }
@@ -56,7 +57,7 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     let [mut control, mut faulty] = [HonestyTally::default(); 2];
     for (kind, outcomes) in &kinds {
         let mut tally = HonestyTally::default();
-        for outcome in *outcomes {
+        for outcome in outcomes {
             tally.add(outcome, &kind.named_by);
         }
         row(&mut text, &kind.name, &tally);
@@ -78,7 +79,7 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     text.push_str("\nwrong and not named (kind, case, strength, promised margin, true margin, remarks, what broke)\n");
     for (kind, outcomes) in &kinds {
         for (n, outcome) in outcomes.iter().enumerate() {
-            if let HonestyOutcome::Accepted(accepted) = outcome
+            if let Some(accepted) = outcome.accepted()
                 && !accepted.broken.is_empty()
                 && !accepted.is_named(&kind.named_by)
             {
@@ -90,15 +91,12 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
 }
 
 /// A kind with the outcomes of its cases.
-type OfKind<'a> = (&'a Kind, &'a [HonestyOutcome]);
+type OfKind<'a> = (&'a Kind, Vec<&'a HonestyOutcome>);
 
 fn accepted<'a>(kinds: &'a [OfKind<'a>]) -> impl Iterator<Item = (&'a Kind, &'a Accepted)> {
-    let of = |(kind, outcomes): &OfKind<'a>| {
-        let kind = *kind;
-        outcomes.iter().filter_map(move |outcome| match outcome {
-            HonestyOutcome::Accepted(accepted) => Some((kind, accepted)),
-            _ => None,
-        })
+    let of = |(kind, outcomes): &'a OfKind<'a>| {
+        let accepted = outcomes.iter().filter_map(|outcome| outcome.accepted());
+        accepted.map(|accepted| (*kind, accepted))
     };
     kinds.iter().flat_map(of)
 }
@@ -138,8 +136,7 @@ fn right(text: &mut String, kinds: &[OfKind<'_>]) {
         symbols.concat(),
     );
     for (kind, outcomes) in kinds.iter().filter(|(kind, _)| kind.control) {
-        let own = [(*kind, *outcomes)];
-        let accepted: Vec<&Accepted> = accepted(&own).map(|(_, accepted)| accepted).collect();
+        let accepted: Vec<&Accepted> = outcomes.iter().filter_map(|of| of.accepted()).collect();
         let shares = COUNTED.map(|parameter| {
             let held = accepted
                 .iter()
@@ -167,7 +164,7 @@ fn right(text: &mut String, kinds: &[OfKind<'_>]) {
 }
 
 /// Kinds of the verdicts, each with its number.
-fn reasons(outcomes: &[HonestyOutcome]) -> String {
+fn reasons(outcomes: &[&HonestyOutcome]) -> String {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for outcome in outcomes {
         if let HonestyOutcome::Refused(reason) = outcome {
@@ -208,15 +205,14 @@ fn remarks(text: &mut String, kinds: &[OfKind<'_>]) {
     }
 }
 
-/// The kinds with the outcomes of their cases.
+/// The kinds with the outcomes of their cases, which take turns.
 fn kinds<'a>(
     campaign: &'a HonestyCampaign,
     outcomes: &'a [HonestyOutcome],
 ) -> impl Iterator<Item = OfKind<'a>> {
-    campaign
-        .kinds
-        .iter()
-        .zip(outcomes.chunks(campaign.cases as usize))
+    let count = campaign.kinds.len();
+    let of = move |number| outcomes.iter().skip(number).step_by(count).collect();
+    (campaign.kinds.iter().enumerate()).map(move |(number, kind)| (kind, of(number)))
 }
 
 fn row(text: &mut String, name: &str, tally: &HonestyTally) {
