@@ -2,7 +2,7 @@
 //! command.
 //!
 //! ```text
-//! OUT.part/journal.jsonl   {"program":"0.2.0","command":"grid","settings":{..}}   the head
+//! OUT.part/journal.jsonl   {"program":"0.3.0","command":"grid","settings":{..}}   the head
 //!                          one line of JSON for each finished step
 //! OUT.part/NAME            pieces: data that is replaced as a whole, such as a network in training
 //! ```
