@@ -4,12 +4,33 @@
 #   onecycle-VERSION-linux-MACHINE  the program with the studio inside, static where the musl target can be had
 #   onecycle-VERSION-*.whl          the Python package with the program inside, for Python 3.10 and later (maturin from the registry)
 #   onecycle-c-VERSION-MACHINE.tar.gz  library and header for firmware and programs in C
+#   onecycle-VERSION.pack           the trained identifier, for boards and for --pack
+#   onecycle-VERSION.cdx.json       what the program is made of (SBOM): every crate with version, licence and checksum, in CycloneDX
 #   SHA256SUMS                      their checksums
-# Needs Rust, a C linker, Python 3.10 with venv and, unless all crates are there, the network. No arguments.
+# Needs Rust, a C linker, git, Python 3.10 with venv and, unless all crates are there, the network.
+# ./release.sh --twice makes all of it in two new clones at different paths, and fails unless every file has the same bytes.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
-[[ $# -eq 0 ]] || { echo "release.sh: it has no options" >&2; exit 2; }
-for command in cargo python3 sha256sum strip tar; do
+
+twice() {
+    local scratch
+    scratch=$(mktemp -d)
+    trap 'rm -rf "$scratch"' EXIT
+    for clone in "$scratch/one" "$scratch/another/place"; do
+        git clone --quiet . "$clone"
+        env -u CARGO_TARGET_DIR "$clone/release.sh"
+    done
+    diff "$scratch/one/dist/SHA256SUMS" "$scratch/another/place/dist/SHA256SUMS"
+    echo "both builds have the same bytes:"
+    cat "$scratch/one/dist/SHA256SUMS"
+}
+
+case "$*" in
+"") ;;
+--twice) twice && exit ;;
+*) echo "release.sh: its only option is --twice" >&2; exit 2 ;;
+esac
+for command in cargo git python3 sha256sum strip tar; do
     command -v "$command" >/dev/null || { echo "release.sh: $command is missing" >&2; exit 1; }
 done
 
@@ -18,6 +39,12 @@ version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1)
 machine=$(uname -m)
 rm -rf dist
 mkdir dist
+
+# The same bytes from any folder, of any user, at any time: no path of this machine in a message, no time but that of the commit.
+SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
+export SOURCE_DATE_EPOCH
+cargo_home=$(realpath -m "${CARGO_HOME:-$HOME/.cargo}")
+export RUSTFLAGS="${RUSTFLAGS:-} --remap-path-prefix=$PWD=/onecycle --remap-path-prefix=$cargo_home=/cargo"
 
 # Whether the toolchain has this target; rustup may fetch it.
 has_target() {
@@ -56,8 +83,20 @@ cargo build --release --locked --manifest-path onboard/c/Cargo.toml --target-dir
 name=onecycle-c-$version-$machine
 mkdir "dist/$name"
 cp "$target/release/libonecycle.a" onboard/c/onecycle.h onboard/c/examples/*.c LICENSE-* "dist/$name/"
-tar -czf "dist/$name.tar.gz" -C dist "$name"
+tar --sort=name --mtime="@$SOURCE_DATE_EPOCH" --owner=0 --group=0 --numeric-owner -cf - -C dist "$name" | gzip -n >"dist/$name.tar.gz"
 rm -r "dist/${name:?}"
+
+echo "== identifier"
+cp onboard/packs/default.pack "dist/onecycle-$version.pack"
+
+echo "== what the program is made of"
+CYCLONEDX_VERSION=0.5.9
+tools=$target/release-tools
+[[ $("$tools/bin/cargo-cyclonedx" cyclonedx --version 2>/dev/null) == *" $CYCLONEDX_VERSION" ]] ||
+    RUSTFLAGS='' cargo install --quiet --locked --debug --force --root "$tools" cargo-cyclonedx --version "$CYCLONEDX_VERSION"
+"$tools/bin/cargo-cyclonedx" cyclonedx --quiet --manifest-path cli/Cargo.toml --features studio --format json --spec-version 1.5 --override-filename sbom
+mv cli/sbom.json "dist/onecycle-$version.cdx.json"
+find . -name sbom.json -not -path "./target/*" -delete
 
 (cd dist && sha256sum -- * >SHA256SUMS)
 ls -l dist

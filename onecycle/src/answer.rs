@@ -3,7 +3,7 @@
 use onecycle_design::cascade::Cascade;
 use onecycle_design::{Assessment, Comparison, Controller, Model, Pid, assess};
 use onecycle_identify::{Identification, Identified};
-use onecycle_link::{Agreement, ControlLoop, LoopGains, Recording};
+use onecycle_link::{ControlLoop, LoopGains, Recording};
 
 use crate::design::DesignReport;
 use crate::log_gains::{LogLoop, pid};
@@ -57,8 +57,7 @@ pub(crate) fn of(found: &Identification, recording: &Recording, subject: &Subjec
 pub(crate) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> Answer {
     let overlay = subject.gains.and_then(|gains| gains.overlay.as_ref());
     let sure = words::sure(identified, overlay.map(|overlay| overlay.explained));
-    let read_back = subject.gains.and_then(|gains| gains.read_back.as_ref());
-    if read_back.is_some_and(|read| read.agreement() == Agreement::Differs) {
+    if subject.of_log.is_some_and(LogLoop::is_contradicted) {
         let (reason, next) = words::contradicted();
         return not_yet(reason, next, Some(sure));
     }

@@ -69,9 +69,6 @@ impl LogLoop {
         let ControlLoop::Rate(axis) = self.control_loop else {
             return Ok(self);
         };
-        if self.read_back.is_some() {
-            return Ok(self);
-        }
         let mut all = file.read_back(number)?.into_iter();
         let read_back = all.find(|read| read.axis == axis);
         Ok(Self { read_back, ..self })
@@ -135,13 +132,18 @@ impl LogLoop {
     /// Whether a model is wrong because it calls the loop unstable under the gains that flew, on nearly every process of its
     /// posterior. Gains that the signals contradict are not those that flew.
     pub(crate) fn contradicts(&self, choice: &Controllers) -> bool {
-        let differs = |read: &ReadBack| read.agreement() == Agreement::Differs;
-        let is_known = !self.read_back.as_ref().is_some_and(differs);
+        let is_known = !self.is_contradicted();
         let against = choice.against.as_ref().filter(|_| is_known);
         against.is_some_and(|against| {
             let stable = against.least.map_or(0.0, |least| least.stable);
             against.figures.is_none() && stable < MOST_STABLE_IF_WRONG
         })
+    }
+
+    /// Whether the gains that were read back from the signals are others than the parameters of the log.
+    pub(crate) fn is_contradicted(&self) -> bool {
+        let read = self.read_back.as_ref();
+        read.is_some_and(|read| read.agreement() == Agreement::Differs)
     }
 
     /// What the report says, after writing parameters if that was asked for.
@@ -220,8 +222,7 @@ impl LogLoop {
         identified: &Identified,
         choice: &Controllers,
     ) -> Result<Written, String> {
-        let read = self.read_back.as_ref().map(ReadBack::agreement);
-        if read == Some(Agreement::Differs) {
+        if self.is_contradicted() {
             return Err(words::CONTRADICTED.to_owned());
         }
         let no_gains = || words::no_gains(self.control_loop);

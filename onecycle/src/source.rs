@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use onecycle_link::{
     Axis, ControlLoop, CsvOptions, Flight, FlightLog, LogError, LogFormat, ReadBack, ReadError,
@@ -120,6 +121,8 @@ pub struct LogFile<'a> {
     source: &'a dyn Source,
     /// What it holds.
     pub log: FlightLog,
+    /// The gains read back of one flight: all axes of a survey ask for them.
+    read_back: Mutex<Option<(usize, Vec<ReadBack>)>>,
 }
 
 impl<'a> LogFile<'a> {
@@ -135,7 +138,11 @@ impl<'a> LogFile<'a> {
 
     /// A flight log that was scanned before.
     pub fn new(source: &'a dyn Source, log: FlightLog) -> Self {
-        Self { source, log }
+        Self {
+            source,
+            log,
+            read_back: Mutex::default(),
+        }
     }
 
     /// Name of the file.
@@ -180,13 +187,24 @@ impl<'a> LogFile<'a> {
         self.log.flights.iter().enumerate().map(of).collect()
     }
 
-    /// The gains of every rate loop of a flight, read back from its signals.
+    /// The gains of every rate loop of a flight, read back from its signals. The file is read once for the same flight.
     ///
     /// # Errors
     /// The log cannot be read any more.
     pub fn read_back(&self, flight: usize) -> Result<Vec<ReadBack>, Error> {
-        let read = self.log.read_back(opened(self.source)?, flight);
-        read.map_err(|error| Error::of_log(&self.source.name(), &error))
+        let mut kept = self
+            .read_back
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        match &*kept {
+            Some((number, read)) if *number == flight => Ok(read.clone()),
+            _ => {
+                let read = self.log.read_back(opened(self.source)?, flight);
+                let read = read.map_err(|error| Error::of_log(&self.source.name(), &error))?;
+                *kept = Some((flight, read.clone()));
+                Ok(read)
+            }
+        }
     }
 
     /// The recording of signals.

@@ -95,14 +95,14 @@ fn of_loop(
     let signals = file.signals(number, of_log.control_loop())?;
     let asked = of_log.specification(*asked, false);
     let (mut one, mut shown) = part(0.0..IDENTIFIED, || parts(&signals, of_log.flight(), &asked));
+    if one.best().is_some() {
+        of_log = of_log.with_read_back(file, number)?;
+    }
     while let Some((at, of)) = one.best().and_then(|at| Some((at, shown.get_mut(at)?))) {
         let Ok(best) = &of.identification.outcome else {
             break;
         };
         let mut choice = Controllers::of_identified(best, of_log.in_force());
-        if of_log.contradicts(&choice) {
-            of_log = of_log.with_read_back(file, number)?;
-        }
         if of_log.contradicts(&choice) {
             one.parts[at].outcome = Err(Refusal::Verdict(Verdict::UnstableInForce));
             of.identification.refuse(Verdict::UnstableInForce);
@@ -120,11 +120,9 @@ fn of_loop(
             },
         );
         if request.write.file.is_some() && answer.verdict == Advice::Change {
-            of_log = of_log.with_read_back(file, number)?;
             one.to_write = Some(of_log.judged(&request.write, Some(best), Some(&choice)));
         }
         if has_pages {
-            of_log = of_log.with_read_back(file, number)?;
             let gains = of_log.gains(&of.recording, &of.identification, Some(&choice));
             choice = choice.with_trade_off(&best.for_design(0).0);
             of.gains = Some(gains);

@@ -75,8 +75,16 @@ pub(super) fn next(of: &Survey) -> String {
         (Some(files), _) => answers::written(files),
         _ if !is_told => words::no_loop(of.lost.as_deref()),
         (None, Some(step)) => answers::write(&of.file, "", (of.ending, step)),
-        (None, None) => answers::NOTHING.to_owned(),
+        (None, None) => refused(of).unwrap_or_else(|| answers::NOTHING.to_owned()),
     }
+}
+
+/// What to do about the first loop whose process is known and whose gains are not to be touched.
+fn refused(of: &Survey) -> Option<String> {
+    let is_refused =
+        |one: &&FlightLoop| one.best().is_some() && one.answer.verdict == Advice::NotYet;
+    let one = of.loops.iter().find(is_refused)?;
+    Some(format!("{}: {}", one.control_loop, one.answer.next))
 }
 
 /// Share of the way to the proposed gains that is written. `None` if every loop is kept.

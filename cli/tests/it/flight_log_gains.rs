@@ -98,7 +98,11 @@ fn words(text: &str) -> String {
 
 /// `px4_chirps.ulg` with `new` over the bytes that follow `name`.
 fn chirps_with(folder: &Scratch, name: &[u8], new: &[u8]) -> String {
-    let mut bytes = std::fs::read(example("px4_chirps.ulg")).unwrap();
+    log_with(folder, &example("px4_chirps.ulg"), name, new)
+}
+
+fn log_with(folder: &Scratch, log: &str, name: &[u8], new: &[u8]) -> String {
+    let mut bytes = std::fs::read(log).unwrap();
     let found = bytes.windows(name.len()).position(|part| part == name);
     let at = found.unwrap() + name.len();
     bytes[at..at + new.len()].copy_from_slice(new);
@@ -123,6 +127,20 @@ fn a_contradicted_log_has_no_good_headline() {
     );
     let class = |headline: &str| headline.split('>').next().unwrap().to_owned();
     assert_ne!(class(&good), class(&contradicted));
+    // The card of the whole flight says the same, and what to do about it where nothing else is to be done.
+    let log = log_with(
+        &folder,
+        &log,
+        b"float MC_PITCHRATE_P",
+        &0.6_f32.to_le_bytes(),
+    );
+    let flight = words(&run(&["identify", &log]).stdout);
+    let card = "roll rate NOT YET: the gains read back from the signals contradict the parameters of the log.";
+    assert!(flight.contains(card), "{flight}");
+    assert!(
+        flight.contains("Next roll rate: Check that no gain was moved in flight"),
+        "{flight}"
+    );
 }
 
 // Twelve times the gain that flew, of which the gain margin is 6: the model calls the loop unstable. Either the model is wrong or

@@ -161,7 +161,8 @@ impl TunerCore {
     }
 
     /// Takes the command (input unit) of another controller, which holds the axis instead of the safe controller outside of a
-    /// test. It counts for the next tick only: give it before each. See [`TunerCore::is_in_charge`].
+    /// test. It counts for the next tick only: give it before each. One that is not finite does not count: the safe controller
+    /// holds the axis. See [`TunerCore::is_in_charge`].
     pub fn beside(&mut self, command: f32) {
         self.given = Some(command);
     }
@@ -231,7 +232,7 @@ impl TunerCore {
         reference: f32,
     ) -> f32 {
         let dt_s = self.tick_s(time_s);
-        self.other = self.given.take();
+        self.other = self.given.take().filter(|command| command.is_finite());
         if let Err(reason) = self.watch(dt_s, measurement, reference) {
             self.end(reason);
         }
