@@ -8,43 +8,49 @@
 #   onecycle-VERSION.cdx.json       what the program is made of (SBOM): every crate with version, licence and checksum, in CycloneDX
 #   SHA256SUMS                      their checksums
 # Needs Rust, a C linker, git, Python 3.10 with venv and, unless all crates are there, the network.
-# ./release.sh --twice makes all of it in two new clones at different paths, and fails unless every file has the same bytes.
+# It builds the last commit in a clone of its own, always at the same place, so that everybody gets the same bytes.
+# ./release.sh --twice builds it twice and fails unless every file has the same bytes.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
-
-twice() {
-    local scratch
-    scratch=$(mktemp -d)
-    trap 'rm -rf "$scratch"' EXIT
-    for clone in "$scratch/one" "$scratch/another/place"; do
-        git clone --quiet . "$clone"
-        env -u CARGO_TARGET_DIR "$clone/release.sh"
-    done
-    diff "$scratch/one/dist/SHA256SUMS" "$scratch/another/place/dist/SHA256SUMS"
-    echo "both builds have the same bytes:"
-    cat "$scratch/one/dist/SHA256SUMS"
-}
-
 case "$*" in
-"") ;;
---twice) twice && exit ;;
+"" | --twice) ;;
 *) echo "release.sh: its only option is --twice" >&2; exit 2 ;;
 esac
 for command in cargo git python3 sha256sum strip tar; do
     command -v "$command" >/dev/null || { echo "release.sh: $command is missing" >&2; exit 1; }
 done
 
-target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml | head -n 1)
+place=/tmp/onecycle-$version
+if [[ $PWD != "$place" ]]; then
+    build() {
+        mkdir "$place" || { echo "release.sh: is another release under way? If not, remove $place" >&2; exit 1; }
+        trap 'rm -rf "$place"' EXIT
+        git clone --quiet . "$place"
+        env -u CARGO_TARGET_DIR "$place/release.sh"
+        rm -rf dist
+        mv "$place/dist" dist
+        rm -rf "$place"
+    }
+    build
+    if [[ "$*" == --twice ]]; then
+        first=$(cat dist/SHA256SUMS)
+        build
+        diff <(echo "$first") dist/SHA256SUMS
+        echo "both builds have the same bytes"
+    fi
+    exit
+fi
+
+target=$place/target
 machine=$(uname -m)
-rm -rf dist
 mkdir dist
 
-# The same bytes from any folder, of any user, at any time: no path of this machine in a message, no time but that of the commit.
+# No path of the user in a message, and no time but that of the commit.
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 cargo_home=$(realpath -m "${CARGO_HOME:-$HOME/.cargo}")
-export RUSTFLAGS="${RUSTFLAGS:-} --remap-path-prefix=$PWD=/onecycle --remap-path-prefix=$cargo_home=/cargo"
+export RUSTFLAGS="${RUSTFLAGS:-} --remap-path-prefix=$cargo_home=/cargo"
 
 # Whether the toolchain has this target; rustup may fetch it.
 has_target() {
