@@ -203,8 +203,13 @@ impl StructureArguments {
                 )));
             }
             if has && !given && !gains.contains(&parameter) {
+                let is_default = structure == Structure::Soiptd && self.process.values.is_empty();
+                let other = match is_default {
+                    true => "; for one lag and a dead time add --process foptd",
+                    false => "",
+                };
                 return Err(Failure::usage(format!(
-                    "the process {name} needs {option}; its parameters are {}",
+                    "the process {name} needs {option}; its parameters are {}{other}",
                     list()
                 )));
             }

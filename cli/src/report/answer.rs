@@ -7,26 +7,17 @@ use onecycle::{Estimate, Identified, Interval, Parameter};
 
 use super::number::{apart, seconds, short};
 use super::units::Units;
-use super::wrap::wrapped_to;
-use crate::output::columns;
+use super::wrap::{width, wrapped};
 use crate::results::answer::{Advice, Answer, Columns, Figures, Gain};
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, painted};
 use crate::words::answer as words;
 
-/// Width of a card without a terminal, and the narrowest and widest one in a terminal.
-const WIDTH: usize = 80;
-const WIDTHS: (usize, usize) = (60, 100);
 /// Columns of names, in the narrowest terminal one less, and of values, with a blank before each.
 const NAME: usize = 20;
 const VALUE: usize = 12;
 
 /// A blank at which no line ends.
 const TOGETHER: &str = "\u{a0}";
-
-/// Width of cards in this terminal.
-pub(super) fn width() -> usize {
-    columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
-}
 
 /// The card of a recording. `read`: what was taken for what. `more`: how many remarks are not on it; `None`: all that is
 /// known follows.
@@ -84,7 +75,7 @@ pub(super) fn verdict(text: &mut String, lead: &str, of: Advice, reason: &str) {
         _ => HOLDS,
     };
     let mut lines = String::new();
-    wrapped_to(&mut lines, lead, &words::headline(of, reason), width());
+    wrapped(&mut lines, lead, &words::headline(of, reason));
     let (before, rest) = lines.split_at(lead.len());
     let (name, after) = rest.split_at(words::verdict(of).len());
     let _ = write!(text, "{before}{}{after}", painted(style, name));
@@ -97,7 +88,7 @@ pub(super) fn line(text: &mut String, name: &str, words: &str) {
 /// Words behind `lead`, wrapped.
 pub(super) fn fitted(text: &mut String, lead: &str, words: &str) {
     let mut lines = String::new();
-    wrapped_to(&mut lines, lead, words, width());
+    wrapped(&mut lines, lead, words);
     text.push_str(&lines.replace(TOGETHER, " "));
 }
 

@@ -7,26 +7,19 @@ use onecycle_design::{Spans, TypedGain, Vendor};
 
 use super::number::{seconds, short, significant};
 use super::units::Units;
-use super::wrap::wrapped;
+use super::wrap::{width, wrapped};
 use crate::results::controllers::{Controllers, Row};
 use crate::style::{HOLDS, headed, painted};
 use crate::words::controllers::{self as words, brief, change, judgement};
 use crate::words::sentence;
 
-/// Titles of the columns and their widths in the text.
-const COLUMNS: [(&str, usize); 11] = [
-    ("Kp", 9),
-    ("Ki", 9),
-    ("Kd", 9),
-    ("filter", 8),
-    ("phase", 9),
-    ("gain", 6),
-    ("Ms", 6),
-    ("over-", 6),
-    ("settling", 9),
-    ("load", 8),
-    ("noise", 7),
+/// Titles of the columns in the text.
+const COLUMNS: [&str; 11] = [
+    "Kp", "Ki", "Kd", "filter", "phase", "gain", "Ms", "over-", "settling", "load", "noise",
 ];
+
+/// The column that the text leaves out, for lines of 80 columns: the gain margin stands below the table.
+const LEFT_OUT: usize = 5;
 
 /// Titles of the columns on a page.
 pub(super) const TITLES: [&str; 11] = [
@@ -49,22 +42,29 @@ const UNITS: [&str; 11] = ["", "", "", "Tf", "deg", "", "", "shoot", "", "IAE", 
 /// The table of all styles and the gains in force.
 pub(super) fn table(choice: &Controllers) -> String {
     let mut text = headed("\nControllers\n");
-    for titles in [COLUMNS.map(|(title, _)| title), UNITS] {
-        let line = line("", &titles.map(str::to_owned));
-        let _ = writeln!(text, "{}", line.trim_end());
+    let against =
+        (choice.against.as_ref()).map(|of| cells(choice, &of.controller, of.figures.as_ref()));
+    let rows: Vec<(&Row, Result<[String; 11], String>)> = (choice.rows.iter())
+        .map(|row| {
+            let of = |design: &Design| cells(choice, &design.controller, row.figures.as_ref());
+            let outcome = row.proposal.outcome.as_ref();
+            (row, outcome.map(of).map_err(brief))
+        })
+        .collect();
+    let titles = [COLUMNS, UNITS].map(|titles| titles.map(str::to_owned));
+    let designed = rows.iter().filter_map(|(_, cells)| cells.as_ref().ok());
+    let widths = widths(titles.iter().chain(&against).chain(designed));
+    for titles in &titles {
+        let _ = writeln!(text, "{}", line("", titles, &widths));
     }
-    if let Some(against) = &choice.against {
-        let cells = cells(choice, &against.controller, against.figures.as_ref());
-        let _ = writeln!(text, "{}", line("  yours", &cells).trim_end());
+    if let Some(cells) = &against {
+        let _ = writeln!(text, "{}", line("  yours", cells, &widths));
     }
-    for row in &choice.rows {
+    for (row, cells) in &rows {
         let name = name(choice, row);
-        let shown = match &row.proposal.outcome {
-            Ok(design) => line(
-                &name,
-                &cells(choice, &design.controller, row.figures.as_ref()),
-            ),
-            Err(error) => format!("{name:<10}  {}", brief(error)),
+        let shown = match cells {
+            Ok(cells) => line(&name, cells, &widths),
+            Err(reason) => format!("{name:<NAMES$}  {reason}"),
         };
         let is_chosen = choice.is_chosen(row) && row.figures.is_some();
         let _ = match shown.trim_end() {
@@ -91,12 +91,31 @@ fn name(choice: &Controllers, row: &Row) -> String {
     format!("{mark} {}", row.proposal.specification.style.name())
 }
 
-fn line(name: &str, cells: &[String; 11]) -> String {
-    let mut line = format!("{name:<10}");
-    for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
-        let _ = write!(line, "{cell:>width$}");
+/// Widths of the columns: two blanks before the widest cell, or one where the lines were too long.
+fn widths<'a>(rows: impl Iterator<Item = &'a [String; 11]>) -> [usize; 11] {
+    let mut widths = [0; 11];
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = cell.chars().count().max(*width);
+        }
     }
-    line
+    widths[LEFT_OUT] = 0;
+    let all = NAMES + widths.iter().sum::<usize>() + 2 * (widths.len() - 1);
+    let blanks = if all > width() { 1 } else { 2 };
+    widths.map(|width| width + blanks)
+}
+
+/// Columns of the names of styles.
+const NAMES: usize = 10;
+
+fn line(name: &str, cells: &[String; 11], widths: &[usize; 11]) -> String {
+    let mut line = format!("{name:<NAMES$}");
+    for (at, (cell, width)) in cells.iter().zip(widths).enumerate() {
+        if at != LEFT_OUT {
+            let _ = write!(line, "{cell:>width$}");
+        }
+    }
+    line.trim_end().to_owned()
 }
 
 /// The cells of a controller, without units.

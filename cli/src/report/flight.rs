@@ -21,7 +21,7 @@ pub fn text(of: &Survey, has_details: bool) -> String {
         return text;
     }
     text.push_str(&headed(&format!(
-        "\nFlight {}         parts  gain (90 %)                        delay  your margins        P, I, D proposed\n",
+        "\nFlight {}         parts  gain (90 %)                    delay  your margins\n",
         of.number
     )));
     for one in &of.loops {
@@ -106,11 +106,7 @@ fn row(text: &mut String, one: &FlightLoop) {
     let margins = one
         .in_force()
         .map_or("-".to_owned(), |judged| margins(&judged));
-    let gains = one.proposed().map_or("none".to_owned(), |judged| {
-        let pid = judged.pid;
-        [pid.kp, pid.ki, pid.kd].map(short).join(", ")
-    });
-    let _ = writeln!(text, "  {gain:<33} {delay:>6}  {margins:<18}  {gains}");
+    let _ = writeln!(text, "  {gain:<29} {delay:>6}  {margins}");
 }
 
 /// Gain of a loop with its interval, and delay.

@@ -2,18 +2,21 @@
 
 use std::fmt::Write;
 
+use crate::output::columns;
 use crate::words::as_shown;
 
-/// Widest line of remarks, as terminals are.
-const WIDTH: usize = 96;
+/// Width of a report without a terminal, and the narrowest and widest one in a terminal.
+const WIDTH: usize = 80;
+const WIDTHS: (usize, usize) = (60, 100);
 
-/// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.
-pub fn wrapped(text: &mut String, lead: &str, words: &str) {
-    wrapped_to(text, lead, words, WIDTH);
+/// Width of reports in this terminal.
+pub(super) fn width() -> usize {
+    columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
-/// As [`wrapped`], in lines of `width`.
-pub(super) fn wrapped_to(text: &mut String, lead: &str, words: &str, width: usize) {
+/// Writes `words` behind `lead`, in lines as wide as the terminal, indented like the first.
+pub fn wrapped(text: &mut String, lead: &str, words: &str) {
+    let width = width();
     let mut line = lead.to_owned();
     let mut is_first = true;
     for word in as_shown(words).split_ascii_whitespace() {

@@ -73,10 +73,22 @@ const ALLOWED: [(&str, &[&str]); 12] = [
         &["onecycle", "onecycle-cli", "onecycle-plant"],
     ),
     ("onecycle-lab-py", &["onecycle-lab-cli"]),
+    (
+        "onecycle-fuzz",
+        &[
+            "onecycle",
+            "onecycle-cli",
+            "onecycle-lab",
+            "onecycle-link",
+            "onecycle-live",
+            "onecycle-onboard",
+        ],
+    ),
 ];
 
 /// Crates of the workspace in `research/`.
-const RESEARCH: [&str; 4] = [
+const RESEARCH: [&str; 5] = [
+    "onecycle-fuzz",
     "onecycle-lab",
     "onecycle-lab-cli",
     "onecycle-lab-py",

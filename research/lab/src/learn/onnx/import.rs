@@ -45,15 +45,15 @@ pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
         let refused = |reason| OnnxError::Node {
             node: match &node.name[..] {
                 "" => format!("number {number}"),
-                name => name.to_owned(),
+                name => shown(name),
             },
-            op: node.op_type.clone(),
+            op: shown(&node.op_type),
             reason,
         };
         if !is_default(&node.domain) {
             return Err(refused(format!(
                 "operators of the domain {} are not supported",
-                node.domain
+                shown(&node.domain)
             )));
         }
         reader.take(node).map_err(refused)?;
@@ -61,7 +61,8 @@ pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
     let output = only("output", graph.output.iter().map(|output| &output.name[..]))?;
     if reader.current != output {
         return Err(OnnxError::Model(format!(
-            "its output {output} is not the output of its last node"
+            "its output {} is not the output of its last node",
+            shown(output)
         )));
     }
     let (normalisation, network) = reader.chain.network()?;
@@ -303,9 +304,14 @@ fn attribute<'a>(node: &'a Node, name: &str) -> Option<&'a super::message::Attri
         .find(|attribute| attribute.name == name)
 }
 
+/// A name of the file as a message shows it: on one line, without control characters.
+fn shown(name: &str) -> String {
+    name.escape_debug().to_string()
+}
+
 /// Shape and numbers of a constant.
 fn numbers(tensor: &Tensor) -> Result<(Vec<usize>, Vec<f32>), String> {
-    let name = &tensor.name;
+    let name = shown(&tensor.name);
     if tensor.data_location == EXTERNAL {
         return Err(format!(
             "the numbers of {name} are in another file: export the model with \
