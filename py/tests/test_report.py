@@ -155,6 +155,15 @@ def test_the_answer_and_the_card(found, program):
     assert found._repr_html_().startswith("<pre>") and "FIRST GAINS" in found._repr_html_()
 
 
+def test_a_hostile_file_name_is_text_in_a_notebook(tmp_path):
+    path = tmp_path / "<img src=x onerror=alert(1)>\x1b[2J\n.csv"
+    path.write_bytes((ROOT / HOVER).read_bytes())
+    found = onecycle.identify(path, design=False)
+    assert found.model and "<img" in str(found)
+    assert "<img" not in found._repr_html_() and "&lt;img" in found._repr_html_()
+    assert "\x1b" not in str(found) and "\x1b" not in found.summary()
+
+
 @pytest.mark.parametrize("options", [{}, {"against": (40, 5, 12)}, {"overshoot": 0.02}, {"style": "paper"}])
 def test_texts_name_keywords(options):
     found = onecycle.identify(HOVER, **options)

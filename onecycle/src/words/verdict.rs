@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use crate::{DesignError, Parameter, Verdict};
 use onecycle_onboard::refine::DomainEdge;
 
-use crate::words::number::frequency;
+use crate::words::number::{frequency, seconds};
 
 /// One sentence of advice, with the options of this program.
 pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
@@ -40,6 +40,9 @@ const NOT_EXCITED: &str = "Move the set-point: 30 s of quick stick movements on 
 const LOWEST: f64 = 1.0 / 20.0;
 const PERIODS: f64 = 20.0;
 
+/// Beyond this length (s) a process is moved by hand, in steps.
+const LONGEST_CHIRP_S: f64 = 300.0;
+
 /// What was excited, what is missing, and the test that excites it.
 fn excite(informative_rad_per_s: Option<(f64, f64)>, needed_rad_per_s: f64) -> String {
     let excited = match informative_rad_per_s {
@@ -56,12 +59,21 @@ fn excite(informative_rad_per_s: Option<(f64, f64)>, needed_rad_per_s: f64) -> S
         }
     };
     if !(needed_rad_per_s > 0.0 && needed_rad_per_s.is_finite()) {
-        return format!("{excited}: raise the amplitude of the input, or fly a chirp.");
+        return format!("{excited}: raise the amplitude of the input, or record a chirp.");
     }
     let lowest = LOWEST * needed_rad_per_s;
     let length_s = PERIODS * TAU / lowest;
+    if length_s > LONGEST_CHIRP_S {
+        // Half a period of the highest frequency, and of a fourth of it.
+        let half_period_s = 0.5 * TAU / needed_rad_per_s;
+        return format!(
+            "{excited}: step the input up and down ten times or more, after changing times from {} to {}.",
+            seconds(half_period_s),
+            seconds(4.0 * half_period_s),
+        );
+    }
     format!(
-        "{excited}: fly a chirp from {} to {} for {length_s:.0} s.",
+        "{excited}: record a chirp from {} to {} for {length_s:.0} s.",
         frequency(lowest),
         frequency(needed_rad_per_s)
     )
@@ -228,16 +240,17 @@ mod tests {
         assert!(of(39.0).to_string().ends_with("does not tell the gain"));
     }
 
-    // A chirp up to 20 Hz begins at 1 Hz; 20 periods of 1 Hz are 20 s.
+    // A chirp up to 20 Hz begins at 1 Hz; 20 periods of 1 Hz are 20 s. A slow process is stepped: half a period of 0.02 Hz is 25 s.
     #[test]
-    fn the_missing_excitation_is_a_chirp() {
+    fn the_missing_excitation_is_a_chirp_or_steps() {
         assert_eq!(
             without_information(Some((0.13, 2.31)), 20.0),
-            "The recording is informative from 0.13 Hz to 2.3 Hz only: fly a chirp from 1.0 Hz to 20 Hz for 20 s."
+            "The recording is informative from 0.13 Hz to 2.3 Hz only: record a chirp from 1.0 Hz to 20 Hz for 20 s."
         );
         assert_eq!(
             without_information(None, 0.02),
-            "The input excites the process too little: fly a chirp from 0.0010 Hz to 0.020 Hz for 20000 s."
+            "The input excites the process too little: step the input up and down ten times or more, after changing times \
+             from 25.00 s to 100 s."
         );
     }
 
@@ -251,7 +264,7 @@ mod tests {
         );
         for needed_hz in [f64::NAN, 0.0, f64::INFINITY] {
             let advice = without_information(None, needed_hz);
-            assert!(advice.ends_with("or fly a chirp."), "{advice}");
+            assert!(advice.ends_with("or record a chirp."), "{advice}");
         }
     }
 
