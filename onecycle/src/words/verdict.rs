@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use crate::{DesignError, Parameter, Verdict};
 use onecycle_onboard::refine::DomainEdge;
 
-use crate::words::number::{frequency, seconds};
+use crate::words::number::{frequency, short};
 
 /// One sentence of advice, with the options of this program.
 pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
@@ -67,9 +67,9 @@ fn excite(informative_rad_per_s: Option<(f64, f64)>, needed_rad_per_s: f64) -> S
         // Half a period of the highest frequency, and of a fourth of it.
         let half_period_s = 0.5 * TAU / needed_rad_per_s;
         return format!(
-            "{excited}: step the input up and down ten times or more, after changing times from {} to {}.",
-            seconds(half_period_s),
-            seconds(4.0 * half_period_s),
+            "{excited}: step the input up and down ten times or more, after changing times from {} s to {} s.",
+            short(half_period_s),
+            short(4.0 * half_period_s),
         );
     }
     format!(
@@ -250,7 +250,7 @@ mod tests {
         assert_eq!(
             without_information(None, 0.02),
             "The input excites the process too little: step the input up and down ten times or more, after changing times \
-             from 25.00 s to 100 s."
+             from 25.0 s to 100 s."
         );
     }
 
