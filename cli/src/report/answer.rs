@@ -7,7 +7,7 @@ use onecycle::{Estimate, Identified, Interval, Parameter};
 
 use super::number::{apart, seconds, short};
 use super::units::Units;
-use super::wrap::{width, wrapped};
+use super::wrap::{TOGETHER, width, wrapped};
 use crate::results::answer::{Advice, Answer, Columns, Figures, Gain};
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, painted};
 use crate::words::answer as words;
@@ -15,9 +15,6 @@ use crate::words::answer as words;
 /// Columns of names, in the narrowest terminal one less, and of values, with a blank before each.
 const NAME: usize = 20;
 const VALUE: usize = 12;
-
-/// A blank at which no line ends.
-const TOGETHER: &str = "\u{a0}";
 
 /// The card of a recording. `read`: what was taken for what. `more`: how many remarks are not on it; `None`: all that is
 /// known follows.
@@ -82,14 +79,7 @@ pub(super) fn verdict(text: &mut String, lead: &str, of: Advice, reason: &str) {
 }
 
 pub(super) fn line(text: &mut String, name: &str, words: &str) {
-    fitted(text, &format!("{name:<9}"), words);
-}
-
-/// Words behind `lead`, wrapped.
-pub(super) fn fitted(text: &mut String, lead: &str, words: &str) {
-    let mut lines = String::new();
-    wrapped(&mut lines, lead, words);
-    text.push_str(&lines.replace(TOGETHER, " "));
+    wrapped(text, &format!("{name:<9}"), words);
 }
 
 /// Gains and figures, in columns if gains are in force.

@@ -7,7 +7,7 @@ use onecycle_design::{Spans, TypedGain, Vendor};
 
 use super::number::{seconds, short, significant};
 use super::units::Units;
-use super::wrap::{width, wrapped};
+use super::wrap::{TOGETHER, width, wrapped};
 use crate::results::controllers::{Controllers, Row};
 use crate::style::{HOLDS, headed, painted};
 use crate::words::controllers::{self as words, brief, change, judgement};
@@ -232,7 +232,9 @@ fn typed(vendor: Vendor, gains: &[TypedGain; 3], spans: &Spans) -> String {
     let action = words::action(gains);
     if !vendor.has_range_of_measurement() {
         let values = shown.collect::<Vec<_>>().join(", ");
+        // A line to type stays on one line.
         let lines = vendor.lines(gains).map_or(values, |lines| {
+            let lines = lines.replace(' ', TOGETHER);
             lines.replace('\n', ", ").replace(":, ", ": ")
         });
         let reversed = match action {

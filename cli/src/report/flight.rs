@@ -42,7 +42,7 @@ fn card(of: &Survey, has_details: bool) -> String {
     let title = format!("{}  {}, flight {}", of.file, of.firmware, of.number);
     let mut text = answer::heading(&title);
     if of.loops.is_empty() {
-        answer::fitted(&mut text, "", words::NOTHING_LOGGED);
+        wrapped(&mut text, "", words::NOTHING_LOGGED);
         return text;
     }
     let mut has_titles = false;
@@ -55,10 +55,10 @@ fn card(of: &Survey, has_details: bool) -> String {
         }
         if let Some((gain, delay)) = process(one) {
             let words = format!("{gain}, delay {delay}");
-            answer::fitted(&mut text, &format!("  {:<20} ", "process"), &words);
+            wrapped(&mut text, &format!("  {:<20} ", "process"), &words);
         }
         if let Some(Err(reason)) = &one.to_write {
-            answer::fitted(&mut text, "  not written: ", reason);
+            wrapped(&mut text, "  not written: ", reason);
         }
     }
     answer::line(&mut text, "Next", &next(of));

@@ -9,6 +9,9 @@ use crate::words::as_shown;
 const WIDTH: usize = 80;
 const WIDTHS: (usize, usize) = (60, 100);
 
+/// A blank at which no line ends.
+pub(super) const TOGETHER: &str = "\u{a0}";
+
 /// Width of reports in this terminal.
 pub(super) fn width() -> usize {
     columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
@@ -21,7 +24,7 @@ pub fn wrapped(text: &mut String, lead: &str, words: &str) {
     let mut is_first = true;
     for word in as_shown(words).split_ascii_whitespace() {
         if !is_first && line.chars().count() + 1 + word.chars().count() > width {
-            let _ = writeln!(text, "{line}");
+            let _ = writeln!(text, "{}", line.replace(TOGETHER, " "));
             line = " ".repeat(lead.len());
             is_first = true;
         }
@@ -31,5 +34,5 @@ pub fn wrapped(text: &mut String, lead: &str, words: &str) {
         line.push_str(word);
         is_first = false;
     }
-    let _ = writeln!(text, "{line}");
+    let _ = writeln!(text, "{}", line.replace(TOGETHER, " "));
 }

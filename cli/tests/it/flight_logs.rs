@@ -189,7 +189,7 @@ fn every_loop_of_a_flight_is_listed_with_its_parts() {
         "pitch rate      1 of 1",
         "rad/s^2",
         "Pitch rate",
-        "--axis AXIS --loop LOOP",
+        "--loop LOOP",
     ] {
         assert!(text.contains(fact), "{fact}: {text}");
     }

@@ -161,8 +161,8 @@ impl TunerCore {
     }
 
     /// Takes the command (input unit) of another controller, which holds the axis instead of the safe controller outside of a
-    /// test. It counts for the next tick only: give it before each. One that is not finite does not count: the safe controller
-    /// holds the axis. See [`TunerCore::is_in_charge`].
+    /// test. It counts for the next tick only: give it before each. One that is not finite aborts the test, and the safe
+    /// controller holds the axis. See [`TunerCore::is_in_charge`].
     pub fn beside(&mut self, command: f32) {
         self.given = Some(command);
     }
@@ -232,7 +232,7 @@ impl TunerCore {
         reference: f32,
     ) -> f32 {
         let dt_s = self.tick_s(time_s);
-        self.other = self.given.take().filter(|command| command.is_finite());
+        self.other = self.given.take();
         if let Err(reason) = self.watch(dt_s, measurement, reference) {
             self.end(reason);
         }
@@ -269,11 +269,12 @@ impl TunerCore {
     /// Takes the sample after the guard has checked it.
     fn watch(&mut self, dt_s: f32, measurement: &Measurement, reference: f32) -> Result<(), Abort> {
         let is_test = self.is_in_charge() && !self.is_proven();
-        self.guard.check_data(measurement, reference, dt_s)?;
+        // Before the rest, which may end the tick too.
         if self.other.is_some_and(|command| !command.is_finite()) {
             self.other = None;
             return Err(Abort::NotFinite);
         }
+        self.guard.check_data(measurement, reference, dt_s)?;
         self.value = measurement.value;
         let rate = self.rate.step(measurement, dt_s, self.settings.rate_lag_s);
         if !is_test {

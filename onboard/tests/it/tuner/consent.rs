@@ -169,6 +169,9 @@ fn a_command_counts_once() {
     tuner.beside(f32::NAN);
     assert!(step(&mut tuner, 2.0).is_finite());
     assert_eq!(tuner.reason(), Some(Abort::NotFinite));
+    // At a time that has been, too.
+    tuner.beside(f32::NAN);
+    assert!(step(&mut tuner, 1.0).is_finite());
 }
 
 /// Flies a test whose analysis takes place elsewhere: the desk is away for `away` ticks and comes back with the outcome.
