@@ -234,8 +234,8 @@ fn typed(vendor: Vendor, gains: &[TypedGain; 3], spans: &Spans) -> String {
         let values = shown.collect::<Vec<_>>().join(", ");
         // A line to type stays on one line.
         let lines = vendor.lines(gains).map_or(values, |lines| {
-            let lines = lines.replace(' ', TOGETHER);
-            lines.replace('\n', ", ").replace(":, ", ": ")
+            let lines = lines.lines().map(|line| line.trim().replace(' ', TOGETHER));
+            lines.collect::<Vec<_>>().join(", ").replace(":, ", ": ")
         });
         let reversed = match action {
             "direct" => "; the sign of the action is reversed",
