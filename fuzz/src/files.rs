@@ -6,7 +6,7 @@ use onecycle_lab::learn::onnx;
 use onecycle_onboard::pack::{HEADER, MAGIC, Pack, VERSION, content_hash};
 use onecycle_onboard::signature::LENGTH;
 
-/// A pack behind a head that fits it: what is accepted gives no NaN for a signature.
+/// A pack behind a head that fits it; one that is accepted can be used.
 pub(crate) fn pack(bytes: &[u8]) {
     let _ = Pack::read(bytes);
     let body = match bytes.starts_with(&MAGIC) {

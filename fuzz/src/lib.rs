@@ -13,7 +13,7 @@ mod vehicle;
 pub type Target = fn(&[u8]);
 
 /// The targets by their names.
-pub const TARGETS: [(&str, Target); 19] = [
+pub const TARGETS: &[(&str, Target)] = &[
     ("table", readers::table),
     ("matlab", readers::matlab),
     ("ulog", readers::ulog),

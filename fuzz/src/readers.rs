@@ -1,8 +1,7 @@
 //! What the readers do with any bytes: no panic, sound recordings, and files of parameters that set what they show.
 
 use onecycle_link::{
-    CsvOptions, FirmwareKind, FlightLog, Recording, parameter_text, read_from, read_parameters,
-    typed_gains,
+    CsvOptions, FlightLog, Recording, parameter_text, read_from, read_parameters, typed_gains,
 };
 
 /// A table, with its default options, with a chosen loop and with a sample rate.
@@ -39,7 +38,7 @@ pub(crate) fn tdms(bytes: &[u8]) {
     table(&behind(b"TDSm", bytes));
 }
 
-/// A file with parameters of PX4 or ArduPilot: what is read, and written again, is the same.
+/// A file with parameters of PX4 or ArduPilot; written again, it sets the same ones.
 pub(crate) fn parameters(bytes: &[u8]) {
     let text = String::from_utf8_lossy(bytes);
     let Ok(read) = read_parameters(&text) else {
@@ -48,10 +47,6 @@ pub(crate) fn parameters(bytes: &[u8]) {
     assert!(!read.lines.is_empty());
     for line in &read.lines {
         assert!(line.value.is_finite() && line.name.len() <= 16);
-    }
-    if read.firmware == FirmwareKind::Px4 {
-        // Integers are kept whole, other numbers in single precision.
-        return;
     }
     let written = parameter_text(read.firmware, 1, &read.lines);
     let again = read_parameters(&written).map(|file| file.lines);

@@ -67,9 +67,9 @@ pub(super) fn table(choice: &Controllers) -> String {
             Err(reason) => format!("{name:<NAMES$}  {reason}"),
         };
         let is_chosen = choice.is_chosen(row) && row.figures.is_some();
-        let _ = match shown.trim_end() {
-            shown if is_chosen => writeln!(text, "{}", painted(HOLDS, shown)),
-            shown => writeln!(text, "{shown}"),
+        let _ = match is_chosen {
+            true => writeln!(text, "{}", painted(HOLDS, &shown)),
+            false => writeln!(text, "{shown}"),
         };
     }
     if let Some(against) = &choice.against {

@@ -189,10 +189,11 @@ fn every_loop_of_a_flight_is_listed_with_its_parts() {
         "pitch rate      1 of 1",
         "rad/s^2",
         "Pitch rate",
-        "--loop LOOP",
     ] {
         assert!(text.contains(fact), "{fact}: {text}");
     }
+    let on_one_line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(on_one_line.contains("--axis AXIS --loop LOOP"), "{text}");
     // A vehicle in the air that nobody moves tells nothing about its rate loops.
     let calm = loops("px4_motor_failure.ulg");
     for name in ["roll rate", "pitch rate", "yaw rate"] {

@@ -165,9 +165,12 @@ fn a_printer_with_a_model_gets_its_model() {
     // kV 1/250 and kA 90/250 per degree.
     let text = run(&[&asked[..5], &["--vendor", "wpilib"]].concat()).stdout;
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let typed = text.split_once("feedforward kS 0 (no dry friction seen), kV 0.00");
+    let (_, typed) = typed.expect("a feed-forward");
+    // Behind the interval of kV.
+    let acceleration = typed.split_once("), ").map(|(_, rest)| rest);
     assert!(
-        text.contains("feedforward kS 0 (no dry friction seen), kV 0.00")
-            && text.contains(", kA 0.3"),
+        acceleration.is_some_and(|rest| rest.starts_with("kA 0.3")),
         "{text}"
     );
     // A power of 0 to 1 is not taken for one of 0 to 127.
