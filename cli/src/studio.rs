@@ -26,6 +26,7 @@ use std::rc::Rc;
 
 use onecycle::request::HALF_STEP;
 use onecycle::source::is_flight_log;
+use onecycle::words::{Named, named};
 use onecycle::{Controller, LogFile, Model, Pid, Report, Request, Source, with_progress};
 use onecycle_design::Vendor;
 use onecycle_link::{FlightLog, ParameterFiles};
@@ -75,7 +76,7 @@ impl Studio {
             Ok(message) => self.answer(&message),
         };
         let answer = answer.unwrap_or_else(|error| json!({ "error": words::sentence(&error) }));
-        words::with_options(&answer.to_string()).into_owned()
+        named(&answer.to_string(), field).into_owned()
     }
 
     fn answer(&mut self, message: &Value) -> Result<Value, String> {
@@ -96,12 +97,13 @@ impl Studio {
                 let (request, source) = (request(message)?, self.source()?);
                 let found = followed("identifying", || request.identify(source));
                 let found = found.map_err(|error| error.to_string())?;
-                let report = value(&found);
+                let mut report = value(&found)?;
                 if let Ok(identified) = &found.identification.outcome {
                     self.draws = identified.posterior.models(DRAWS);
+                    report["formula"] = json!(identified.model.structure().transfer_function());
                 }
                 self.found = Some(found);
-                report
+                Ok(report)
             }
             "survey" => {
                 let (mut request, source) = (request(message)?, self.source()?);
@@ -393,4 +395,30 @@ fn simulated(options: &[String]) -> Result<Value, String> {
 
 fn value(report: &impl serde::Serialize) -> Result<Value, String> {
     serde_json::to_value(report).map_err(|error| error.to_string())
+}
+
+/// A setting as the page has it: one of its fields, or what one types among the further options.
+fn field(of: Named<'_>) -> String {
+    let (name, value) = match of {
+        Named::Setting(name, value) => (name, value),
+        Named::Identify(_) => return "“Identify”".to_owned(),
+        Named::Log(_) => return "“Loop”".to_owned(),
+        _ => return String::new(),
+    };
+    let label = match name {
+        "axis" | "loop" => "Loop",
+        "details" => "Process and remarks",
+        "from" => "From",
+        "input_range" => "Range of its output",
+        "output_range" => "Range of its measurement",
+        "structure" => "Structure",
+        "style" => "Style",
+        "to" => "To",
+        "vendor" => "Gains for",
+        "write" => "Save half step",
+        _ => return format!("“Further options”: {}", words::option(of)),
+    };
+    value.map_or(format!("“{label}”"), |value| {
+        format!("“{label}”: {value}")
+    })
 }

@@ -36,7 +36,7 @@ pub fn with_options(text: &str) -> Cow<'_, str> {
     named(text, option)
 }
 
-fn option(of: Named<'_>) -> String {
+pub(crate) fn option(of: Named<'_>) -> String {
     match of {
         Named::Setting(name, value) => {
             let value = value.map_or(String::new(), |value| format!(" {value}"));

@@ -11,8 +11,11 @@
 //! round, the factor of `e^2` is 20 (`1 + 9 + 9 + 1`), and the estimate is half of the jitter of the period. Both variances
 //! are compared by medians, over the third of the samples with the largest slopes and the third with the smallest ones. Of a
 //! sine, `D4 y` is largest where the slope is smallest, so a smooth output does not pass for jitter.
+//!
+//! Rounding to steps of `q` does: its error is white with the variance `q^2/12` where the output passes many steps, and
+//! repeats where it hardly moves. So that variance is added to the one of the smallest slopes.
 
-use crate::signals::Signals;
+use crate::signals::{Signals, smallest_step};
 
 /// Half width of the difference that shows the slope, as a share of the period; in samples at least that of `D4`.
 const HALF_WIDTH: f64 = 1.0 / 14.0;
@@ -68,7 +71,8 @@ pub(crate) fn jitter(signals: &Signals<'_>, period_s: f64) -> Option<f64> {
     };
     let slope_sq = |part: &[(f64, f64)]| part.iter().map(|pair| pair.0 * pair.0).sum::<f64>();
     let (flat, steep) = (&pairs[..third], &pairs[pairs.len() - third..]);
-    let (few, many) = (variance(flat), variance(steep));
+    let rounding = smallest_step(y).powi(2) / 12.0;
+    let (few, many) = (variance(flat) + rounding, variance(steep));
     let slopes = (slope_sq(steep) - slope_sq(flat)) / third as f64;
     let found = ((many - few) / slopes).max(0.0).sqrt();
     let is_significant = many > few * (1.0 + SIGNIFICANT / (third as f64).sqrt());
@@ -88,14 +92,19 @@ mod tests {
 
     use super::*;
 
-    /// Jitter found in a sine of amplitude 1 with 100 samples in each of 20 periods.
-    fn found(sigma: f64, mut late: impl FnMut(f64) -> f64) -> Option<f64> {
+    /// Jitter found in a sine of amplitude 1 with 100 samples in each of 20 periods, which the sensor shows as `shown`.
+    fn found(
+        sigma: f64,
+        mut late: impl FnMut(f64) -> f64,
+        shown: impl Fn(f64) -> f64,
+    ) -> Option<f64> {
         let mut noise = Noise::from_seed(7);
         let time_s: Vec<f64> = (0..2000).map(f64::from).collect();
         let output: Vec<f64> = (time_s.iter())
             .map(|t| {
                 let at = t + late(noise.standard_normal());
-                (0.01 * std::f64::consts::TAU * at).sin() + sigma * noise.standard_normal()
+                let sine = (0.01 * std::f64::consts::TAU * at).sin();
+                shown(sine + sigma * noise.standard_normal())
             })
             .collect();
         let signals = Signals {
@@ -114,25 +123,39 @@ mod tests {
     #[test]
     fn the_jitter_is_found() {
         for sigma in [0.0, 0.006] {
-            let value = found(sigma, |z| 0.2 * z).unwrap();
+            let value = found(sigma, |z| 0.2 * z, |y| y).unwrap();
             assert!((value / 0.2 - 1.0).abs() < 0.2, "{sigma}: {value}");
         }
         let mut drift = 0.0;
-        let value = found(0.0, |z| {
+        let drifting = |z| {
             drift += 0.2 * z;
             drift
-        });
+        };
+        let value = found(0.0, drifting, |y| y);
         let value = value.unwrap();
         assert!((value / 0.107 - 1.0).abs() < 0.2, "{value}");
+    }
+
+    // A sensor of 100 to 400 steps. Where it hardly moves its error repeats, so its noise depends on the slope.
+    #[test]
+    fn rounding_is_no_jitter() {
+        for quantum in [0.005, 0.01, 0.02] {
+            let shown = |value: f64| (value / quantum).round() * quantum;
+            for sigma in [0.0, 0.1 * quantum, 0.3 * quantum] {
+                assert_eq!(found(sigma, |_| 0.0, shown), None, "{quantum} {sigma}");
+            }
+            let value = found(0.0, |z| 0.5 * z, shown).unwrap();
+            assert!((value / 0.5 - 1.0).abs() < 0.2, "{quantum}: {value}");
+        }
     }
 
     // Noise that does not depend on the slope, and no noise at all, are no jitter.
     #[test]
     fn white_noise_is_no_jitter() {
         for sigma in [0.0, 1e-3, 0.01, 0.1] {
-            assert_eq!(found(sigma, |_| 0.0), None, "{sigma}");
+            assert_eq!(found(sigma, |_| 0.0, |y| y), None, "{sigma}");
         }
         // The jitter of 0.02 sample periods moves the output by 0.0013 at most, a tenth of the noise.
-        assert_eq!(found(0.013, |z| 0.02 * z), None);
+        assert_eq!(found(0.013, |z| 0.02 * z, |y| y), None);
     }
 }

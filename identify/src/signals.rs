@@ -24,6 +24,15 @@ pub(crate) fn range(values: &[f64]) -> (f64, f64) {
     })
 }
 
+/// Smallest change between neighbouring samples: an estimate of the quantum of the sensor. Infinite if nothing changes.
+pub(crate) fn smallest_step(output: &[f64]) -> f64 {
+    output
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .filter(|&step| step > 0.0)
+        .fold(f64::INFINITY, f64::min)
+}
+
 /// Whether all values are equal.
 pub(crate) fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|value| *value == values[0])

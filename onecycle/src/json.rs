@@ -10,8 +10,8 @@ use std::borrow::Cow;
 
 use onecycle_design::{Assessment, Design, Margins, Model, Robustness, StepMetrics, Style};
 use onecycle_identify::{
-    Estimate, Excitation, Identification, Identified, Interval, Oscillation, Prediction, Remark,
-    StepIntervals, Switching,
+    Estimate, Excitation, Identification, Interval, Oscillation, Prediction, Remark, StepIntervals,
+    Switching,
 };
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
@@ -338,7 +338,7 @@ fn identification(report: &Report, with_rows: bool) -> IdentifyReport<'_> {
             is_alike: test.is_alike,
         }),
         structure: identified.map(|i| i.model.structure().name()),
-        process: identified.map(process),
+        process: identified.map(|identified| process(&identified.estimate)),
         below: identified.map(|i| below(&i.estimate)),
         joint_probability: identified.and_then(|i| i.joint_probability),
         fit: identified.map(|i| fit(&i.fit)),
@@ -411,9 +411,14 @@ fn verdict(found: &Identification) -> Verdict {
     }
 }
 
-fn process(identified: &Identified) -> Process {
-    let structure = identified.model.structure();
-    let intervals = identified.estimate.iter();
+/// The structure, and each parameter with its interval, as in a report.
+pub fn parameters(estimate: &Estimate) -> impl Serialize + use<> {
+    process(estimate)
+}
+
+fn process(estimate: &Estimate) -> Process {
+    let structure = estimate.structure();
+    let intervals = estimate.iter();
     let known = |(parameter, interval): (crate::Parameter, _)| {
         let symbol = parameter.symbol_in(structure);
         (parameter.key(), Known { symbol, interval })

@@ -1,17 +1,21 @@
 """What Python and Dask cost: `python py/benches/overhead.py`, with the package built with `pip install ./py ./research/py`. A word runs
-one part: `call`, `many`, `memory`, `dask`."""
+one part: `call`, `options`, `many`, `memory`, `dask`, `thousand`; `install WHEEL` installs a wheel into a clean environment."""
 
 import os
 import resource
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
+import venv
 from pathlib import Path
 
 from distributed import Client, LocalCluster, get_task_stream
 
 import onecycle
 import onecycle_lab
+from onecycle import _cluster
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,6 +33,36 @@ def of_identify():
         reports.append(found)
     print(f"identify: {1e3 * statistics.median(took):.1f} ms in Rust, and {1e3 * statistics.median(beyond):.2f} ms "
           f"(at most {1e3 * max(beyond):.2f} ms) from Python to Rust and back")
+
+
+def of_options():
+    """Settings of the controller cost no second identification."""
+    recording = onecycle.read(ROOT / "examples/simulated_hover.csv")
+    took_s = {}
+    for name, options in {"none": {}, "output_filter": {"output_filter": 0.0}, "hold": {"hold": "held"}, "noise": {"noise": 0.2}}.items():
+        of = []
+        for _ in range(15):
+            begin = time.perf_counter()
+            onecycle.identify(recording, structure="soiptd", **options)
+            of.append(time.perf_counter() - begin)
+        took_s[name] = statistics.median(of)
+    print("identify with a setting, beside one without: "
+          + ", ".join(f"{name} {took_s[name] / took_s['none']:.2f}" for name in list(took_s)[1:]))
+
+
+def of_install(wheel):
+    """Seconds until a wheel and NumPy are in a clean environment without a compiler: with an empty cache of pip, and with a full one."""
+    with tempfile.TemporaryDirectory() as folder:
+        took_s = []
+        for turn in ("empty", "full"):
+            venv.create(Path(folder, turn), with_pip=True)
+            python = Path(folder, turn, "bin", "python")
+            begin = time.perf_counter()
+            subprocess.run([python, "-m", "pip", "install", "-q", "--cache-dir", Path(folder, "cache"), wheel], check=True,
+                           env={"PATH": str(python.parent)})
+            took_s.append(time.perf_counter() - begin)
+        subprocess.run([python, "-m", "onecycle", "--version"], check=True, stdout=subprocess.DEVNULL)
+    print(f"{Path(wheel).name} and NumPy installed in {took_s[0]:.1f} s, from pip's cache in {took_s[1]:.1f} s")
 
 
 def simulated(cases):
@@ -116,8 +150,38 @@ def of_dask(cases=10_000):
               f"{size:.0f} bytes an outcome", flush=True)
 
 
+def pretended(rows, seconds):
+    """A task that takes its time and no processor."""
+    time.sleep(seconds)
+    return seconds, rows
+
+
+def of_thousand(threads=1000, processes=8):
+    """What scheduler and client do with many workers: threads that sleep instead of computing, and outcomes of real cases."""
+    campaign = relay_campaign(1000)
+    rows = campaign.cases(0, 1000)
+    rate = 1000 / alone(1000)[0]
+    with LocalCluster(n_workers=processes, threads_per_worker=threads // processes, dashboard_address=None) as cluster:
+        with Client(cluster) as client, tempfile.TemporaryDirectory() as out:
+            seconds = _cluster.task_s(threads)
+            cases = int(rate * seconds)
+            rows = (rows * (1 + cases // len(rows)))[:cases]
+            count = 4 * threads
+            left = iter(range(count))
+            folder = _cluster._Folder(out, "thousand")
+            client.scatter(rows, broadcast=True)
+            begin = time.perf_counter()
+            _cluster._spread(client, lambda _: next(left, None), lambda n: (pretended, rows, seconds),
+                             lambda n, made: folder.add(n * cases, made[1]))
+            took_s = time.perf_counter() - begin
+    print(f"{threads} threads of {processes} processes that sleep {seconds:.0f} s in {count} tasks of {cases} cases: {took_s:.0f} s, "
+          f"{100 * (1 - count * seconds / threads / took_s):.1f} % idle, {count * cases / took_s:.0f} cases a second")
+
+
 def main():
-    parts = {"call": of_identify, "many": of_many, "memory": of_memory, "dask": of_dask}
+    if sys.argv[1:2] == ["install"]:
+        return of_install(sys.argv[2])
+    parts = {"call": of_identify, "options": of_options, "many": of_many, "memory": of_memory, "dask": of_dask, "thousand": of_thousand}
     for name in sys.argv[1:] or parts:
         parts[name]()
 

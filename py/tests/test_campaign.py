@@ -2,11 +2,14 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -115,9 +118,16 @@ def test_a_folder_is_one_table(measure, tmp_path, client):
     path, out = tmp_path / "campaign.toml", tmp_path / "out"
     # Noise of the size of the oscillation: cases are refused, and others not.
     path.write_text(RECIPE.replace("0.02", "0.3") if measure == "identification" else SMALL[measure])
-    outcomes = onecycle.campaign(path, client=client, out=out, shard=1, cases=9)
+    schemas = []
+
+    # While it grows too.
+    def look(done, count):
+        found = [pyarrow.parquet.read_schema(file) for file in out.glob("*.parquet")]
+        schemas.append({sum(one.equals(of) for one in found) // len(found) for of in found})
+
+    outcomes = onecycle.campaign(path, client=client, out=out, shard=1, cases=9, progress=look)
     assert {file.suffix for file in out.iterdir()} == {".parquet"}
-    assert len({tuple(pyarrow.parquet.read_schema(file).names) for file in out.iterdir()}) == 1
+    assert all(sizes == {1} for sizes in schemas) and len(schemas) == 9
     frame = outcomes.to_pandas()
     of_pandas = pandas.read_parquet(out).set_index("n").sort_index()
     of_polars = polars.read_parquet(out).sort("n")
@@ -188,6 +198,21 @@ def test_an_own_measure_is_a_function(recipe, tmp_path, client):
         onecycle.campaign(recipe, client=client, out=out, cases=4)
 
 
+def test_a_case_without_recording_and_other_kinds_of_values_are_rows(tmp_path, client):
+    (tmp_path / "campaign.toml").write_text(SMALL["honesty"].replace('"wrong_sign"', '"wrong_sign", strength = [5.0, 9.0]'))
+
+    # A number, a text, a truth value, or nothing.
+    def odd(recording, truth):
+        return {"value": [1.5, "text", True, None][len(recording) % 4]}
+
+    outcomes = onecycle.campaign(tmp_path / "campaign.toml", client=client, out=tmp_path / "out", cases=12, shard=3, measure=odd)
+    assert len(outcomes.cases) == 24
+    frame = pandas.read_parquet(tmp_path / "out").set_index("n").sort_index()
+    assert len(frame) == 24
+    for case, value in zip(outcomes.cases, frame["outcome.value"]):
+        assert (case is None or case["value"] is None) == (value is None or value != value), (case, value)
+
+
 def test_tasks_are_some_seconds_of_work(tmp_path, client):
     path, out = tmp_path / "campaign.toml", tmp_path / "out"
     path.write_text(SMALL["relay"])
@@ -212,40 +237,111 @@ def test_tasks_follow_the_workers_that_come(recipe):
         assert len(outcomes) == 24 and max(most) > 4
 
 
-def test_a_worker_of_another_build_is_refused(recipe, client):
+def another_build(folder):
+    """The packages with a byte more behind their code: they load, and are not those of the client."""
+    import onecycle_lab
+
+    for package in (onecycle, onecycle_lab):
+        shutil.copytree(Path(package.__file__).parent, folder / package.__name__)
+    for code in folder.rglob("*.so"):
+        code.write_bytes(code.read_bytes() + b"\0")
+    return {**os.environ, "PYTHONPATH": str(folder)}
+
+
+def scheduler_at(folder, *words):
+    """A scheduler in a process of its own, and its address."""
+    (folder / "at").unlink(missing_ok=True)
+    server = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard", "--scheduler-file", str(folder / "at"), *words]
+    process = subprocess.Popen(server, stderr=subprocess.DEVNULL)
+    while not (folder / "at").exists():
+        time.sleep(0.05)
+    return process, json.loads((folder / "at").read_text())["address"]
+
+
+def worker_of(address, environment=None):
+    words = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-dashboard", "--nthreads", "1"]
+    return subprocess.Popen(words, stderr=subprocess.DEVNULL, env=environment)
+
+
+def ended(*processes):
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def test_workers_of_another_build_are_left_out(recipe, tmp_path):
+    scheduler, address = scheduler_at(tmp_path, "--port", "0")
+    wrong = another_build(tmp_path / "other")
+    workers = [worker_of(address, wrong)]
+    try:
+        with Client(address) as client:
+            client.wait_for_workers(1)
+            with pytest.raises(onecycle.OnecycleError, match="has another build of onecycle .* no other worker is left"):
+                with pytest.warns(UserWarning, match="left out"):
+                    onecycle.campaign(recipe, client=client, shard=1)
+            workers.append(worker_of(address))
+            client.wait_for_workers(2)
+
+            # One more of the other build, which comes when the work has begun.
+            def come(done, count):
+                if done == 1:
+                    workers.append(worker_of(address, wrong))
+                    client.wait_for_workers(3)
+
+            with pytest.warns(UserWarning, match="has another build of onecycle .*: it is left out") as told:
+                outcomes = onecycle.campaign(recipe, client=client, shard=1, progress=come)
+            assert len([one for one in told if "another build" in str(one.message)]) == 2
+            assert outcomes.to_json() == program("campaign", recipe, "--json")
+    finally:
+        ended(scheduler, *workers)
+
+
+def test_versions_and_code_are_compared():
     from onecycle import _cluster
 
-    version, machine, code = _cluster.build()
-    _cluster.check((version, machine, code))
-    _cluster.check((version, "another machine", "0"))
-    for other in (("0.1.0", machine, code), (version, machine, "0")):
-        with pytest.raises(onecycle.OnecycleError, match="another build of onecycle"):
-            _cluster.check(other)
-    with pytest.raises(onecycle.OnecycleError, match="another build of onecycle"):
-        client.submit(_cluster.shard_cases, ("0.1.0", machine, code), RECIPE, (), 0, 1).result()
+    own = version, machine, code = _cluster.build()
+    assert _cluster._difference(own, own, "") is None
+    # Other machines have other code, but one version.
+    assert _cluster._difference(own, (version, "another machine", "0"), "") is None
+    for other in (("0.1.0", machine, code), ("0.1.0", "another machine", code), (version, machine, "0")):
+        assert "another build of onecycle" in _cluster._difference(own, other, "")
+    assert "cannot load onecycle" in _cluster._difference(own, ImportError("No module named 'onecycle'"), "")
 
 
-def test_a_lost_scheduler_is_a_sentence(recipe, tmp_path):
+def test_a_lost_scheduler_is_a_sentence_and_the_next_one_goes_on(recipe, tmp_path):
     out = tmp_path / "out"
-    server = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
-    scheduler = subprocess.Popen([*server, "--scheduler-file", str(tmp_path / "at")], stderr=subprocess.DEVNULL)
-    while not (tmp_path / "at").exists():
-        time.sleep(0.05)
-    address = json.loads((tmp_path / "at").read_text())["address"]
-    words = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-dashboard", "--nthreads", "1"]
-    worker = subprocess.Popen(words, stderr=subprocess.DEVNULL)
-    words = [sys.executable, "-m", "onecycle.campaign", str(recipe), "--scheduler", address, "--out", str(out), "--shard", "1"]
-    run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    scheduler, address = scheduler_at(tmp_path, "--port", "0")
+    worker = worker_of(address)
+    words = [sys.executable, "-m", "onecycle.campaign", str(recipe), "--out", str(out), "--shard", "1", "--scheduler"]
+    run = subprocess.Popen([*words, address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         while not list(out.glob("*.parquet")) and run.poll() is None:
             time.sleep(0.01)
         scheduler.kill()
         _, told = run.communicate(timeout=120)
         assert run.returncode == 3 and "error: the scheduler is lost" in told and "Traceback" not in told
+        ended(worker, scheduler)
+        kept = {path: path.stat().st_mtime_ns for path in out.glob("*.parquet")}
+        assert 0 < len(kept) < 24
+        scheduler, address = scheduler_at(tmp_path, "--port", "0")
+        worker = worker_of(address)
+        again = subprocess.run([*words, address], capture_output=True, text=True)
+        assert again.stdout == program("campaign", recipe), again.stderr
+        assert all(path.stat().st_mtime_ns == before for path, before in kept.items())
     finally:
-        for process in (run, worker, scheduler):
-            process.kill()
-            process.wait()
+        ended(run, worker, scheduler)
+
+
+def test_ctrl_c_ends_a_campaign_that_is_resumed(recipe, tmp_path, client):
+    words = [sys.executable, "-m", "onecycle.campaign", recipe, "--scheduler", client.scheduler.address, "--out", tmp_path / "out"]
+    words = [str(word) for word in [*words, "--shard", 1]]
+    run = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not list((tmp_path / "out").glob("*.parquet")) and run.poll() is None:
+        time.sleep(0.01)
+    run.send_signal(signal.SIGINT)
+    _, told = run.communicate(timeout=60)
+    assert run.returncode == 130 and "the same command goes on" in told and "Traceback" not in told, told
+    assert subprocess.run(words, capture_output=True, text=True).stdout == program("campaign", recipe)
 
 
 @pytest.mark.parametrize("measure", ["relay", "unknown", "recording", "honesty"])
@@ -278,6 +374,53 @@ def test_training_sets_have_the_bytes_of_the_program(tmp_path, client):
     assert (here / names[2]).read_bytes() == (there / names[2]).read_bytes()
 
 
+def test_sets_of_the_classifier_have_the_bytes_of_the_program(tmp_path, client):
+    recipe = tmp_path / "recipe.toml"
+    text = (ROOT / "research/program/reproduction/literal_small.toml").read_text()
+    recipe.write_text(re.sub(r"^(examples|systems) = \d+", r"\1 = 1203", text, flags=re.M))
+    here, there = tmp_path / "here", tmp_path / "there"
+
+    class Enough(Exception):
+        pass
+
+    def stop(done, count):
+        if done == 2:
+            raise Enough
+
+    # Interrupted, and gone on with.
+    with pytest.raises(Enough):
+        onecycle.dataset(recipe, None, here, client=client, progress=stop)
+    counts = []
+    onecycle.dataset(recipe, None, here, client=client, progress=lambda *of: counts.append(of))
+    assert counts[0][0] == 3 and counts[-1][0] == counts[-1][1]
+    program("dataset", recipe, "--into", there)
+    names = sorted(path.name for path in there.iterdir())
+    assert "training.npz" in names and "verification.npz" in names
+    assert sorted(path.name for path in here.iterdir()) == names
+    assert all((here / name).read_bytes() == (there / name).read_bytes() for name in names)
+    with pytest.raises(onecycle.OnecycleError, match="`examples`"):
+        onecycle.dataset(recipe, 5, here, client=client)
+    with pytest.raises(onecycle.OnecycleError, match="`examples`"):
+        onecycle.dataset(None, None, here, client=client)
+
+
+@pytest.mark.parametrize("lost", ["worker", "other build"])
+def test_training_sets_survive_lost_and_wrong_workers(lost, tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    scheduler, address = scheduler_at(tmp_path, "--port", "0")
+    workers = [worker_of(address, another_build(tmp_path / "other") if lost == "other build" else None), worker_of(address)]
+    try:
+        with Client(address) as client, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            client.wait_for_workers(2)
+            onecycle.dataset(None, 12_000, here, client=client, progress=lambda done, count: lost == "worker" and workers[0].kill())
+    finally:
+        ended(scheduler, *workers)
+    program("dataset", "--examples", 12_000, "--into", there)
+    names = sorted(path.name for path in there.iterdir())
+    assert len(names) == 4 and all((here / name).read_bytes() == (there / name).read_bytes() for name in names)
+
+
 def test_a_killed_command_is_resumed_without_loss(recipe, tmp_path, client):
     address = client.scheduler.address
     words = [sys.executable, "-m", "onecycle.campaign", recipe, "--scheduler", address, "--out", tmp_path / "out"]
@@ -302,8 +445,10 @@ def test_errors_are_sentences(tmp_path, client):
     with pytest.raises(onecycle.OnecycleError, match="missing.toml"):
         onecycle.campaign(tmp_path / "missing.toml", client=client)
     path.write_text(RECIPE)
-    with pytest.raises(onecycle.OnecycleError, match="--colour"):
+    with pytest.raises(TypeError, match="'colour'"):
         onecycle.campaign(path, client=client, colour="red")
+    with pytest.raises(onecycle.OnecycleError, match="`cycles` has no effect"):
+        onecycle.campaign(ROOT / "experiments/any_open.toml", client=client, cycles=2)
     words = [sys.executable, "-m", "onecycle.campaign", "missing.toml", "--out", str(tmp_path / "out")]
     run = subprocess.run([*words, "--scheduler", client.scheduler.address], capture_output=True, text=True)
     assert run.returncode == 3 and run.stderr.startswith("error: ") and "missing.toml" in run.stderr

@@ -26,7 +26,7 @@ def printed(notebook):
 
 
 def test_there_are_three():
-    assert [path.stem for path in NOTEBOOKS] == ["flight_log", "paper_table", "relay_test"]
+    assert [path.stem for path in NOTEBOOKS] == ["flight_log", "heater_step", "paper_table"]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -1,6 +1,8 @@
 """The program in the wheel, and what Python has by it."""
 
+import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -79,6 +81,33 @@ def test_experiments_are_those_of_the_program(model, options, words, program, tm
     ours, theirs = onecycle.experiment(model, **options), onecycle.read(tmp_path / "x.csv")
     assert np.array_equal(ours.t, theirs.t) and np.array_equal(ours.u, theirs.u) and np.array_equal(ours.y, theirs.y)
     assert (ours.r is None) == ("loop" not in options) and len(ours) > 100
+
+
+def test_every_option_of_simulate_is_a_keyword(program):
+    from onecycle._options import ExperimentOptions
+
+    options = set(re.findall(r"^  (?:-\w, |    )--([a-z0-9-]+)", program("simulate", "--help"), flags=re.M))
+    # Of the process, of the output, and `expect`, which is a function.
+    process = {"process", "k", "k-over-t-body", "t-prop", "t-prop2", "t-body", "tau", "natural-frequency", "zeta"}
+    others = {"out", "help", "expect", "json"}
+    assert process | others < options
+    assert options - process - others == {name.replace("_", "-") for name in ExperimentOptions.__annotations__}
+
+
+def test_intervals_to_expect_are_those_of_the_program(program):
+    model, options, words = EXPERIMENTS[0]
+    options = options | {"preroll": 5}
+    expected = onecycle.expect(model, **options)
+    told = json.loads(program("simulate", *words.split(), "--preroll=5", "--expect", "--json"))
+    assert told.pop("structure") == "foptd" and list(told) == list(expected) and len(told) > 2
+    for key, of in expected.items():
+        assert (of.estimate, of.low, of.high) == (told[key]["estimate"], told[key]["low"], told[key]["high"])
+    # An efficient estimator reaches them: of 40 recordings 90 % agree, and at least 30 with a probability of 99.5 %.
+    recordings = [onecycle.experiment(model, **options, seed=seed) for seed in range(40)]
+    reports = onecycle.identify_many(recordings, structure="foptd", design=False)
+    assert sum(expected["tau_s"].low < found.params["tau_s"] < expected["tau_s"].high for found in reports) >= 30
+    with pytest.raises(onecycle.OnecycleError, match="`noise`"):
+        onecycle.expect(model, excitation="step", duration=20)
 
 
 def test_an_experiment_that_cannot_be_made_is_a_sentence():

@@ -26,6 +26,10 @@ KINDS = {
     "timedelta": [timedelta(milliseconds=10 * n) for n in range(N)],
     "datetime": [datetime(2026, 11, 26) + timedelta(milliseconds=10 * n) for n in range(N)],
     "datetime with zone": [datetime(2026, 11, 26, tzinfo=timezone.utc) + timedelta(milliseconds=10 * n) for n in range(N)],
+    # Over both changes of the clock.
+    **{f"datetime in {month}": [(datetime(2026, month, day, 0, 59, 59, 500_000, timezone.utc) + timedelta(milliseconds=10 * n)).astimezone(BERLIN)
+                                for n in range(N)] for month, day in ((3, 29), (10, 25))},
+    "Timestamps": [pd.Timestamp("2026-11-26 00:00:00.000000001") + pd.Timedelta(milliseconds=10 * n) for n in range(N)],
     "TimedeltaIndex": pd.to_timedelta(10 * STEP, unit="ms"),
     "TimedeltaIndex[ms]": pd.to_timedelta(10 * STEP, unit="ms").as_unit("ms"),
     "DatetimeIndex": pd.date_range("2026-11-26", periods=N, freq="10ms"),
@@ -67,6 +71,10 @@ def test_other_units_are_not_seconds():
     # Months of a calendar, from January 2025: 31 and then 28 days.
     months = np.datetime64("2025-01") + STEP
     assert list(with_time(months).t[:3]) == [0, 31 * 86_400, 59 * 86_400]
+    # Objects of pandas have nanoseconds, with a zone too.
+    for zone in (None, BERLIN):
+        stamps = [pd.Timestamp("2026-10-25 00:30", tz=zone) + pd.Timedelta(7 * n, "ns") for n in range(N)]
+        assert with_time(stamps).sample_period_s == pytest.approx(7e-9, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -82,6 +90,8 @@ def test_other_units_are_not_seconds():
         (pl.Series([datetime(2026, 1, 1).time()] * N), "time: give numbers"),
         ([datetime(2026, 1, 1, tzinfo=BERLIN)] + [datetime(2026, 1, 2)] * (N - 1), "mixes"),
         (pd.period_range("2026-01", periods=N, freq="h"), "Period"),
+        ([timedelta(seconds=n) for n in range(N - 1)] + [datetime(2026, 1, 1)], "mixes"),
+        ([datetime(1, 1, 1), datetime(9999, 1, 1)] * (N // 2), "mixes"),
     ],
 )
 def test_other_time_is_refused_with_a_sentence(t, words):

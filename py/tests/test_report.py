@@ -53,6 +53,14 @@ def test_values_are_pickled_copied_and_compared(kind, found):
     if kind in ("report", "flight", "model"):
         with pytest.raises(AttributeError, match="immutable"):
             value.model = None
+    for name in {"report": ("intervals", "posterior", "rows"), "design": ("controllers",)}.get(kind, ()):
+        for one in (value, again):
+            with pytest.raises(TypeError, match="does not support item assignment"):
+                getattr(one, name)["k"] = None
+    if kind == "report":
+        for array in (again.posterior["k"], again.rows["time_s"], value.rows["time_s"]):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 1.0
 
 
 def test_a_pickled_report_makes_what_it_does_not_hold(found, tmp_path):
@@ -85,6 +93,24 @@ def test_estimates_and_intervals(found):
     assert dict(dataset.sizes) == {"chain": 1, "draw": 4000} and np.array_equal(dataset["k"][0], draws["k"])
     with pytest.raises(ValueError, match="read-only"):
         draws["k"][0] = 1.0
+
+
+def test_without_pandas_intervals_are_pairs(found, monkeypatch):
+    frame = found.conf_int()
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    assert found.conf_int() == {key: (frame.low[key], frame.high[key]) for key in found.params}
+
+
+def test_help_has_every_keyword_with_its_unit():
+    for function in (onecycle.read, onecycle.identify, onecycle.identify_many, onecycle.identify_flight, onecycle.design,
+                     onecycle.experiment, onecycle.expect, onecycle.campaign):
+        text = inspect.getdoc(function)
+        given = [name for name, of in inspect.signature(function).parameters.items() if of.kind is of.KEYWORD_ONLY]
+        assert given and all(re.search(rf"^{name} : .+\n    \S", text, flags=re.M) for name in given), function
+    assert "output_filter : float\n    Cutoff of a low-pass that the output passed (Hz)" in inspect.getdoc(onecycle.identify)
+    # One name, three meanings.
+    notes = [re.search(r"^noise : .*\n    (.*)", inspect.getdoc(of), flags=re.M)[1] for of in (onecycle.identify, onecycle.design, onecycle.experiment)]
+    assert len(set(notes)) == 3
 
 
 def test_draws_for_arviz(found):
@@ -324,6 +350,7 @@ if found.model is not None and found.controller is not None:
     margin: float | None = onecycle.margins(found.model, found.controller).phase_margin_rad
 draws: float = float(np.mean(found.posterior["k"])) + found.params["k"] + found.resid.sum()
 reports: list[onecycle.Report] = onecycle.identify_many([onecycle.Recording([0], [1], [2])], n_jobs=2, style="calm")
+ends: float = found.conf_int(0.5).loc["k", "low"] + (onecycle.expect(found.model, noise="1%")["k"].low or 0.0)
 kp: float = onecycle.design(onecycle.Model("foptd", k=1.0, t_body_s=2.0, tau_s=0.1), controller="pi").controller.kp
 '''
 WRONG = {
@@ -331,31 +358,38 @@ WRONG = {
     'onecycle.identify("a.csv", structure="fopdt")': "Argument",
     'onecycle.read("a.csv", cycles=1)': "Unexpected keyword argument",
     "onecycle.identify_flight('a.ulg', sample_rate=5)": "Unexpected keyword argument",
+    'onecycle.campaign("a.toml", case=5)': "Unexpected keyword argument",
     'onecycle.identify("a.csv").model.structure': "None",
 }
 
 
-def mypy(path, *words):
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """What mypy keeps of NumPy's types and others: reading them takes most of the time."""
+    return tmp_path_factory.mktemp("cache")
+
+
+def mypy(cache, path, *words):
     # From another folder: the package is the installed one.
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(path.parent / "cache"), *words]
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(cache), *words]
     return subprocess.run(command, capture_output=True, text=True, cwd=path.parent)
 
 
-def test_types_are_strict_and_catch_misspelt_options(tmp_path):
+def test_types_are_strict_and_catch_misspelt_options(tmp_path, cache):
     user = tmp_path / "user.py"
     user.write_text(USER)
-    run = mypy(user, "user.py")
+    run = mypy(cache, user, "user.py")
     assert run.returncode == 0, run.stdout
     user.write_text("import onecycle\n" + "\n".join(WRONG) + "\n")
-    lines = mypy(user, "user.py").stdout.splitlines()
+    lines = mypy(cache, user, "user.py").stdout.splitlines()
     for number, words in enumerate(WRONG.values(), start=2):
         assert any(line.startswith(f"user.py:{number}:") and words in line for line in lines), (words, lines)
 
 
-def test_the_package_is_strict_and_its_stub_is_that_of_the_module(tmp_path):
+def test_the_package_is_strict_and_its_stub_is_that_of_the_module(tmp_path, cache):
     settings = tmp_path / "mypy.ini"
     settings.write_text("[mypy]\nignore_missing_imports = True\n")
-    run = mypy(settings, "--config-file", "mypy.ini", "-p", "onecycle")
+    run = mypy(cache, settings, "--config-file", "mypy.ini", "-p", "onecycle")
     assert run.returncode == 0, run.stdout
     command = [sys.executable, "-m", "mypy.stubtest", "onecycle._onecycle", "--ignore-disjoint-bases"]
     command += ["--mypy-config-file", str(settings)]

@@ -431,7 +431,7 @@ const showResult = () => {
   at("verdict").className = isFound ? "verdict" : "verdict no";
   const answer = report.answer;
   at("verdict").textContent = `${VERDICTS[answer.verdict]}: ${answer.reason.replace(/\.$/, "")}.`;
-  const known = isFound ? [`Identified: ${report.structure}.`, answer.sure, answer.watch] : [report.verdict.advice];
+  const known = isFound ? [`Identified: ${report.structure}, ${report.formula}.`, answer.sure, answer.watch] : [report.verdict.advice];
   at("advice").textContent = known.filter(Boolean).join(" ");
   const of = (name, value) => report.below?.includes(name) ? [`below ${shown(value.high)}`, "", ""] : [value.estimate, value.low, value.high].map((end) => shown(end));
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);

@@ -697,7 +697,7 @@ def simulated(studio):
         studio.until("signals !== undefined")
         studio.rest()
         studio.identify()
-        expect(page.inner_text("#advice").startswith(f"Identified: {process}."), f"{process}, {excitation}: {page.inner_text('#advice')}")
+        expect(page.inner_text("#advice").startswith(f"Identified: {process}, K"), f"{process}, {excitation}: {page.inner_text('#advice')}")
     page.select_option("#s-process", "soiptd")
     page.click("#expect")
     studio.until("!document.getElementById('expected').hidden")

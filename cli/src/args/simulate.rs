@@ -175,6 +175,9 @@ pub(crate) struct Simulate {
     /// of the model is not in them.
     #[arg(long, conflicts_with = "out")]
     pub(crate) expect: bool,
+    /// Print them as JSON
+    #[arg(long, requires = "expect")]
+    pub(crate) json: bool,
     /// File to write [default: the standard output]
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,

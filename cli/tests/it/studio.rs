@@ -47,7 +47,7 @@ fn proposed(report: &Value, factor: f64) -> Value {
 
 // The same code on the same machine; in a browser only the elementary functions differ.
 #[test]
-fn its_report_is_that_of_the_program_to_the_bit() {
+fn its_numbers_are_those_of_the_program_to_the_bit() {
     let roll = (json!({ "axis": "roll" }), &["--axis", "roll"][..]);
     let flat = (
         json!({ "cycles": 4, "ms": 1.5 }),
@@ -60,10 +60,27 @@ fn its_report_is_that_of_the_program_to_the_bit() {
         ("link/tests/data/px4_zstd.mcap", roll),
     ] {
         let file = of_repository(name);
-        let (_, report) = identified(&file, &settings);
+        let (mut studio, report) = identified(&file, &settings);
         let program = run(&[&["identify", &file, "--json"], options].concat());
+        let text = ask(&mut studio, &json!({ "do": "json" }));
+        assert_eq!(text["text"], program.stdout, "{name}");
+        // What the page shows names its own fields.
         let theirs: Value = serde_json::from_str(&program.stdout).unwrap();
-        assert_eq!(report, theirs, "{name}");
+        for part in ["process", "controller", "controllers", "margins", "against"] {
+            assert_eq!(report[part], theirs[part], "{name}: {part}");
+        }
+        assert_eq!(report["answer"]["gains"], theirs["answer"]["gains"]);
+        let shown = report.to_string();
+        let of_fields = shown.replace("“Further options”: --", "");
+        assert!(
+            shown.contains("“Further options”: --") && !of_fields.contains("--"),
+            "{shown}"
+        );
+        let formula = report["formula"].as_str().unwrap_or_default();
+        assert_eq!(
+            formula.contains("e^(-tau s)"),
+            report["process"].is_object()
+        );
     }
 }
 
@@ -166,7 +183,7 @@ fn a_failed_identification_leaves_nothing_to_save() {
     let file = of_repository("examples/logs/px4_chirps.ulg");
     let (mut studio, report) = identified(&file, &json!({ "axis": "roll" }));
     let options = json!({ "do": "identify", "settings": { "axis": "roll", "style": "magic" } });
-    refused(&mut studio, &options, &["--style", "no such style"]);
+    refused(&mut studio, &options, &["“Style”", "no such style"]);
     let gains = json!({ "do": "parameters", "gains": proposed(&report, 1.0) });
     refused(&mut studio, &gains, &["Nothing is identified"]);
 }
@@ -201,7 +218,7 @@ fn a_message_that_makes_no_sense_gets_a_sentence() {
     );
     refused(&mut studio, &json!({ "do": "view" }), &["No signals"]);
     let nowhere = json!({ "do": "identify", "settings": { "structure": "magic" } });
-    refused(&mut studio, &nowhere, &["--structure", "no such structure"]);
+    refused(&mut studio, &nowhere, &["“Structure”", "no such structure"]);
     let simulated = json!({ "do": "simulate", "options": ["--k", "1"] });
     refused(&mut studio, &simulated, &["--t-prop"]);
 }

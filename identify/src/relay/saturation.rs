@@ -1,5 +1,7 @@
 //! Detection of a clipped output: a sensor or a signal at its limit stays at one exact value.
 
+use crate::signals::smallest_step;
+
 /// Largest share of the time that an output that is not clipped spends at its exact maximum or minimum. A sine whose
 /// amplitude is 100 quanta of the sensor spends 4.5 % of the time within one quantum of its maximum.
 const MOST_FLAT: f64 = 0.06;
@@ -27,15 +29,6 @@ pub(super) fn flat_part(output: &[f64], cycles: usize) -> Option<f64> {
         let stretches = flat >= FEWEST_EQUAL * cycles;
         (stretches && part > MOST_FLAT && part > 2.0 * quantised).then_some(part)
     })
-}
-
-/// Smallest change between neighbouring samples: an estimate of the quantum of the sensor.
-fn smallest_step(output: &[f64]) -> f64 {
-    output
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]).abs())
-        .filter(|&step| step > 0.0)
-        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]

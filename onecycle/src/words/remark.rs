@@ -1,6 +1,6 @@
 //! What a remark means.
 
-use crate::{About, DesignError, Identification, Interval, Parameter, Remark};
+use crate::{About, DesignError, Identification, Interval, Parameter, Remark, Structure};
 use onecycle_identify::Nonlinear;
 
 use super::{caution, controllers, listed};
@@ -20,10 +20,22 @@ pub fn details(found: &Identification) -> Vec<(&Remark, String)> {
 }
 
 fn told(found: &Identification, is_wanted: impl Fn(About) -> bool) -> Vec<(&Remark, String)> {
-    let is_relay = found.oscillation().is_some();
+    let of = Of {
+        // One cycle of an input that switches may be a step test.
+        is_relay: (found.oscillation()).is_some_and(|oscillation| oscillation.cycles_steady > 1),
+        structure: (found.outcome.as_ref().ok()).map(|identified| identified.model.structure()),
+    };
     let wanted = (found.remarks.iter()).filter(|remark| is_wanted(remark.about()));
-    let told = wanted.map(|remark| (remark, sentence(remark, is_relay)));
+    let told = wanted.map(|remark| (remark, sentence(remark, of)));
     told.collect()
+}
+
+/// What a remark is on.
+#[derive(Clone, Copy)]
+struct Of {
+    /// Whether the cycles of a relay oscillation were found.
+    is_relay: bool,
+    structure: Option<Structure>,
 }
 
 /// Sentences of all remarks, with a heading for each thing that they are about.
@@ -42,12 +54,12 @@ pub fn grouped(found: &Identification) -> Vec<(&'static str, Vec<String>)> {
     About::ALL.into_iter().filter_map(group).collect()
 }
 
-/// One or two sentences. `is_relay`: whether the cycles of a relay oscillation were fitted.
-fn sentence(remark: &Remark, is_relay: bool) -> String {
+/// One or two sentences.
+fn sentence(remark: &Remark, of: Of) -> String {
     of_recording(remark)
         .or_else(|| of_record(remark))
         .or_else(|| of_estimator(remark))
-        .or_else(|| of_interval(remark, is_relay))
+        .or_else(|| of_interval(remark, of))
         .or_else(|| of_result(remark))
         .or_else(|| caution::sentence(remark))
         .unwrap_or_else(|| format!("{}.", remark.kind()))
@@ -231,8 +243,8 @@ fn without_controller(error: &DesignError) -> String {
 }
 
 /// Remarks on intervals, with the way to narrower ones.
-fn of_interval(remark: &Remark, is_relay: bool) -> Option<String> {
-    let (longer, more) = if is_relay {
+fn of_interval(remark: &Remark, of: Of) -> Option<String> {
+    let (longer, more) = if of.is_relay {
         (
             "use more cycles",
             "use more cycles or a larger relay amplitude",
@@ -240,20 +252,26 @@ fn of_interval(remark: &Remark, is_relay: bool) -> Option<String> {
     } else {
         ("record longer", "record longer or excite the process more")
     };
+    let name = |parameter: Parameter| match of.structure {
+        Some(structure) => parameter.symbol_in(structure),
+        None => parameter.symbol(),
+    };
     Some(match *remark {
         Remark::Weak {
             parameter: Parameter::TBody,
             relative_half_width,
         } => format!(
-            "T_body is known to about {:.0} % only. The controller depends on K/T_body, which is known better.",
-            100.0 * relative_half_width
+            "{} is known to about {:.0} % only. The controller depends on {}, which is known better.",
+            name(Parameter::TBody),
+            100.0 * relative_half_width,
+            name(Parameter::KOverTBody)
         ),
         Remark::Weak {
             parameter,
             relative_half_width,
         } => format!(
             "{} is known to about {:.0} % only; {more}.",
-            parameter.symbol(),
+            name(parameter),
             100.0 * relative_half_width
         ),
         Remark::MarginMayBeLess(margin_rad) => format!(
@@ -315,9 +333,14 @@ fn equal_lags(lags: &[Parameter], mean_s: Interval) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::Structure;
-
     use super::*;
+
+    fn on(is_relay: bool) -> Of {
+        Of {
+            is_relay,
+            structure: Some(Structure::Soptd),
+        }
+    }
 
     // The text of the reports is checked as a whole for relay tests; here what the likelihood adds.
     #[test]
@@ -338,7 +361,7 @@ mod tests {
             Remark::PriorDropped(25.0),
             Remark::NoController(DesignError::Structure(Structure::Foptd)),
         ];
-        let all = remarks.map(|remark| (sentence(&remark, false), remark.kind()));
+        let all = remarks.map(|remark| (sentence(&remark, on(false)), remark.kind()));
         for (sentence, kind) in &all {
             assert!(sentence.ends_with('.') && sentence.len() > 40, "{sentence}");
             assert!(!sentence.starts_with(kind), "{sentence}");
@@ -360,10 +383,14 @@ mod tests {
             parameter: Parameter::TProp,
             relative_half_width: 0.5,
         };
-        assert!(sentence(&weak, true).ends_with("use more cycles or a larger relay amplitude."));
-        assert!(sentence(&weak, false).ends_with("record longer or excite the process more."));
+        assert!(
+            sentence(&weak, on(true)).ends_with("use more cycles or a larger relay amplitude.")
+        );
+        assert!(sentence(&weak, on(false)).ends_with("record longer or excite the process more."));
+        // As the table of parameters calls it.
+        assert!(sentence(&weak, on(false)).starts_with("T2 is known to about 50 %"));
         let margin = Remark::MarginMayBeLess(0.1);
-        assert!(sentence(&margin, true).contains("; use more cycles, or ask"));
-        assert!(sentence(&margin, false).contains("; record longer, or ask"));
+        assert!(sentence(&margin, on(true)).contains("; use more cycles, or ask"));
+        assert!(sentence(&margin, on(false)).contains("; record longer, or ask"));
     }
 }

@@ -14,14 +14,14 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from . import _model, _onecycle
-from ._model import Controller, Margins, Model, margins, simulate, step
+from ._model import Controller, Interval, Margins, Model, margins, simulate, step
 from ._onecycle import OnecycleError, __version__
-from ._options import DesignOptions, ExperimentOptions, FlightOptions, IdentifyOptions, ReadOptions, keywords, settings
+from ._options import CampaignOptions, DesignOptions, ExperimentOptions, FlightOptions, IdentifyOptions, ReadOptions, as_keywords, keywords, settings
 from ._recording import Recording
-from ._report import Answer, Bands, Design, Flight, Gain, Interval, Report, bare
+from ._report import Answer, Bands, Design, Flight, Gain, Report, bare
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
     from typing_extensions import Unpack
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Answer", "Bands", "Controller", "Design", "Flight", "Gain", "Interval", "Margins", "Model", "OnecycleError", "Recording", "Report",
-    "__version__", "campaign", "dataset", "design", "experiment", "identify", "identify_flight", "identify_many", "margins", "read", "simulate", "step",
+    "__version__", "campaign", "dataset", "design", "expect", "experiment", "identify", "identify_flight", "identify_many", "margins", "read", "simulate", "step",
 ]
 
 
@@ -86,6 +86,14 @@ def experiment(model: Model, **options: Unpack[ExperimentOptions]) -> Recording:
     return _model.experiment(model, options)
 
 
+@keywords(ExperimentOptions)
+def expect(model: Model, **options: Unpack[ExperimentOptions]) -> Mapping[str, Interval]:
+    """The 90 % intervals to expect from a test, before it is run: the Cramer-Rao bound, which an efficient estimator reaches. It is
+    `onecycle simulate --expect`, needs `noise`, and takes gusts as `disturbance`; OnecycleError as of `experiment`."""
+    return _model.expect(model, options)
+
+
+@keywords(CampaignOptions)
 def campaign(
     recipe: str | os.PathLike[str],
     client: Any = None,
@@ -93,27 +101,32 @@ def campaign(
     shard: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     measure: Callable[[Recording, dict[str, Any]], Any] | None = None,
-    **options: Any,
+    **options: Unpack[CampaignOptions],
 ) -> Outcomes:
     """Runs a campaign (a TOML file) on Dask and returns its outcomes.
 
     `client` is a `distributed.Client`; without one, workers are started on this machine. A task is `shard` cases, or some seconds
-    of work. In the folder `out` every task leaves a Parquet file, and cases found there are not computed again: the same call
-    resumes, one with more `cases` extends. `progress(done, count)` is called after each task. Options are those of
-    `onecycle-lab campaign`: `cases=1000`.
+    of work. In the folder `out` every task leaves a Parquet file, together one table at any time, and cases found there are not
+    computed again: the same call resumes, one with more `cases` extends. `progress(done, count)` is called after each task.
 
     `measure(recording, truth)` is called for every case instead of the measure of the file, and returns its outcome: a number or a
-    dict of numbers, truth values and texts. `truth` has the structure and the parameters of the process.
+    dict of numbers, truth values and texts. `truth` has the structure and the parameters of the process. A case without recording,
+    as one whose output runs away, has the outcome None.
+
+    OnecycleError if the file or a keyword cannot be used, no worker has the build of the client, or the scheduler is lost.
     """
     from ._cluster import run
 
-    words = [f"--{name.replace('_', '-')}={value}" for name, value in options.items() if value is not None]
-    return run(recipe, client, out, shard, progress, tuple(words), measure)
+    words = [f"--{name.replace('_', '-')}={text}" for name, text in settings("campaign", CampaignOptions, options)]
+    try:
+        return run(recipe, client, out, shard, progress, tuple(words), measure)
+    except OnecycleError as error:
+        raise OnecycleError(as_keywords(str(error))) from error
 
 
 def dataset(
     recipe: str | os.PathLike[str] | None,
-    examples: int,
+    examples: int | None,
     into: str | os.PathLike[str],
     client: Any = None,
     progress: Callable[[int, int], object] | None = None,
@@ -121,7 +134,8 @@ def dataset(
 ) -> Path:
     """Makes a training set on Dask in the folder `into`: the files of `onecycle-lab dataset`, to the bit.
 
-    `recipe` is a TOML file, or None for the paper's multirotors. The same call resumes an interrupted run.
+    `recipe` is a TOML file, or None for the paper's multirotors, and `examples` the number of experiments; None for the recipe of the
+    paper's classifier, which says it. The same call resumes an interrupted run.
     """
     from ._cluster import fill
 

@@ -11,12 +11,17 @@ import inspect
 import json
 import os
 import platform
+import shutil
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from . import _onecycle
 from ._recording import Recording
@@ -36,6 +41,7 @@ if TYPE_CHECKING:
     Own = Callable[[Recording, dict[str, Any]], Any] | None
     #: Outcome and truth of a case, each as JSON.
     Row = list[str]
+    Build = tuple[str, str, str]
 
 #: What the files of a folder say that they were made of.
 SETTINGS = b"onecycle"
@@ -45,8 +51,12 @@ KEPT = ("case", "truth")
 AHEAD = 4
 #: Time that a task of many cases should take (s): the scheduler's part of it, some 3 ms, is small; and the least, at the end.
 TASK_S, LEAST_S = 3.0, 0.3
+#: Time that the client needs for a task and its file (s), with room: it is one for all workers.
+CLIENT_S = 0.04
 #: Attempts beyond the first for a task that fails on its worker, as for want of memory. Lost workers are Dask's own affair.
 RETRIES = 2
+#: Experiments of a task of a classifier's sets: a second or two of work.
+EXAMPLES = 500
 
 
 @lru_cache(maxsize=8)
@@ -59,20 +69,39 @@ def _campaign(text: str, options: tuple[str, ...]) -> Any:
 
 
 @lru_cache(maxsize=1)
-def build() -> tuple[str, str, str]:
-    """The version of the package, the kind of machine, and the hash of the compiled code."""
-    code = hashlib.sha256(Path(_lab._lab.__file__).read_bytes()).hexdigest()
-    return _onecycle.__version__, f"{platform.system()} {platform.machine()}", code
+def build() -> Build:
+    """The version of the package, the kind of machine, and the hash of the compiled code of both packages."""
+    code = hashlib.sha256()
+    for module in (_onecycle, _lab._lab):
+        code.update(Path(module.__file__).read_bytes())
+    return _onecycle.__version__, f"{platform.system()} {platform.machine()}", code.hexdigest()
 
 
-def check(of_client: tuple[str, str, str]) -> None:
-    """Refuses a worker of another version; on machines of one kind, one with other code."""
-    (version, machine, code), own = of_client, build()
-    if own[0] != version or (own[1] == machine and own[2] != code):
-        raise _onecycle.OnecycleError(
-            f"the worker on {platform.node()} has another build of onecycle ({own[0]}, {own[2][:8]}) than the client ({version}, "
-            f"{code[:8]}): install the same packages on both"
-        )
+def _difference(of_client: Build, of_worker: Build | Exception, where: str) -> str | None:
+    """Why a worker is left out: it has another version; on a machine of the same kind, other code; or no package."""
+    if isinstance(of_worker, Exception):
+        return f"the worker {where} cannot load onecycle and onecycle-lab ({of_worker})"
+    (version, machine, code), (its_version, its_machine, its_code) = of_client, of_worker
+    if its_version == version and (its_machine != machine or its_code == code):
+        return None
+    return f"the worker {where} has another build of onecycle ({its_version}, {its_code[:8]}) than the client ({version}, {code[:8]})"
+
+
+@dataclass(frozen=True)
+class _Refused:
+    """What a worker that cannot work on a task returns."""
+
+    worker: str
+    sentence: str
+
+
+def checked(of_client: Build, task: Callable[..., Any], *words: Any) -> Any:
+    """`task(*words)`, if this worker has the build of the client. Runs on a worker."""
+    import distributed
+
+    at = str(distributed.get_worker().address)  # type: ignore[no-untyped-call]
+    sentence = _difference(of_client, build(), at)
+    return _Refused(at, sentence) if sentence else task(*words)
 
 
 def _plain(value: Any) -> Any:
@@ -81,16 +110,14 @@ def _plain(value: Any) -> Any:
 
 
 def _measured(campaign: Any, n: int, own: Callable[[Recording, dict[str, Any]], Any]) -> Row:
-    (t, u, y), truth = campaign.recording(n)
-    outcome = own(Recording(t, u, y, name=f"case {n}"), json.loads(truth))
+    columns, truth = campaign.recording(n)
+    # Without a recording, as of a process that runs away, there is nothing to measure.
+    outcome = None if columns is None else own(Recording(*columns, name=f"case {n}"), json.loads(truth))
     return [json.dumps({"outcome": outcome}, default=_plain), truth]
 
 
-def shard_cases(
-    of_client: tuple[str, str, str], text: str, options: tuple[str, ...], first: int, end: int, own: Own = None
-) -> tuple[float, list[Row]]:
+def shard_cases(text: str, options: tuple[str, ...], first: int, end: int, own: Own = None) -> tuple[float, list[Row]]:
     """The cases from `first` to before `end`, and the time that they took (s). Runs on a worker."""
-    check(of_client)
     campaign = _campaign(text, options)
     begin = time.perf_counter()
     rows = campaign.cases(first, end) if own is None else [_measured(campaign, n, own) for n in range(first, end)]
@@ -121,46 +148,84 @@ def _of_row(row: Row) -> dict[str, Any]:
     return _cells(case) | {f"truth.{name}": value for name, value in _cells(truth).items()}
 
 
-def _write(path: Path, settings: str, first: int, rows: list[Row]) -> None:
+def _united(one: pyarrow.Schema, other: pyarrow.Schema) -> pyarrow.Schema:
+    """The columns of both, in a fixed order. Where one has only nulls it takes the kind of the other; of two kinds text is made."""
     import pyarrow
-    import pyarrow.parquet
 
-    cells = [_of_row(row) for row in rows]
-    names = sorted({name for row in cells for name in row})
-    columns = {"n": pyarrow.array(range(first, first + len(rows)), pyarrow.uint64())}
-    columns |= {name: pyarrow.array([row.get(name) for row in cells]) for name in names}
-    # What a resumed run goes on from: the digits of all numbers, and what has no column.
-    columns["case"] = pyarrow.array([case for case, _ in rows], pyarrow.string())
-    columns["truth"] = pyarrow.array([truth for _, truth in rows], pyarrow.string())
-    _store(path, pyarrow.table(columns).replace_schema_metadata({SETTINGS: settings}))
-
-
-def _store(path: Path, table: pyarrow.Table, times_ns: tuple[int, int] | None = None) -> None:
-    import pyarrow.parquet
-
-    part = path.with_suffix(".tmp")
-    pyarrow.parquet.write_table(table, part)
-    if times_ns:
-        os.utime(part, ns=times_ns)
-    os.replace(part, path)
+    kinds = {field.name: field.type for field in one}
+    for field in other:
+        kind = kinds.setdefault(field.name, field.type)
+        if pyarrow.types.is_null(kind):
+            kinds[field.name] = field.type
+        elif kind != field.type and not pyarrow.types.is_null(field.type):
+            kinds[field.name] = pyarrow.string()
+    names = ["n", *sorted(kinds.keys() - {"n", *KEPT}), *KEPT]
+    return pyarrow.schema([(name, kinds[name]) for name in names])
 
 
-def _unify(paths: list[Path]) -> None:
-    """Gives all files the columns of all: a folder of them is one table. What a file lacks is null."""
-    import pyarrow
-    import pyarrow.parquet
+class _Folder:
+    """The files of a campaign, which are one table at any time: where a file brings a column, those before it get it too."""
 
-    schemas = {path: pyarrow.parquet.read_schema(path) for path in paths}
-    types = {field.name: field.type for schema in schemas.values() for field in schema}
-    names = ["n", *sorted(types.keys() - {"n", *KEPT}), *KEPT]
-    for path, schema in schemas.items():
-        if schema.names != names:
-            table = pyarrow.parquet.read_table(path)
-            absent = {name: pyarrow.nulls(len(table), types[name]) for name in names if name not in schema.names}
-            whole = pyarrow.table({name: absent[name] if name in absent else table.column(name) for name in names})
-            kept = path.stat()
-            # The time at which it was computed.
-            _store(path, whole.replace_schema_metadata(schema.metadata), (kept.st_atime_ns, kept.st_mtime_ns))
+    def __init__(self, out: StrPath, settings: str) -> None:
+        import pyarrow
+        import pyarrow.parquet
+
+        self.path, self.settings, self.schema = Path(out), settings, pyarrow.schema([])
+        self.path.mkdir(parents=True, exist_ok=True)
+        #: File and number of cases by the first case.
+        self.parts: dict[int, tuple[Path, int]] = {}
+        for path in sorted(self.path.glob("part-*.parquet")):
+            of = pyarrow.parquet.read_metadata(path)
+            if (of.metadata or {}).get(SETTINGS) != settings.encode():
+                raise _onecycle.OnecycleError(
+                    f"{self.path} holds the results of another recipe, option, measure or version: name another folder"
+                )
+            self.parts[int(path.stem.removeprefix("part-"))] = path, of.num_rows
+            self.schema = _united(self.schema, of.schema.to_arrow_schema())
+        self._widen()
+
+    def _widen(self) -> None:
+        """Gives the columns of the table to files that lack one."""
+        import pyarrow.parquet
+
+        for path, _ in self.parts.values():
+            if pyarrow.parquet.read_schema(path).remove_metadata() != self.schema:
+                kept = path.stat()
+                self._store(path, pyarrow.parquet.read_table(path))
+                # The time at which it was computed.
+                os.utime(path, ns=(kept.st_atime_ns, kept.st_mtime_ns))
+
+    def _store(self, path: Path, table: pyarrow.Table) -> None:
+        import pyarrow
+        import pyarrow.parquet
+
+        columns = [
+            table.column(of.name).cast(of.type) if of.name in table.column_names else pyarrow.nulls(len(table), of.type)
+            for of in self.schema
+        ]
+        part = path.with_suffix(".tmp")
+        pyarrow.parquet.write_table(pyarrow.table(columns, self.schema.with_metadata({SETTINGS: self.settings})), part)
+        os.replace(part, path)
+
+    def add(self, first: int, rows: list[Row]) -> None:
+        import pyarrow
+
+        cells = [_of_row(row) for row in rows]
+        columns = {"n": pyarrow.array(range(first, first + len(rows)), pyarrow.uint64())}
+        for name in {name for row in cells for name in row}:
+            values = [row.get(name) for row in cells]
+            is_mixed = len({type(value) for value in values if value is not None}) > 1
+            columns[name] = pyarrow.array([None if value is None else str(value) for value in values] if is_mixed else values)
+        # What a resumed run goes on from: the digits of all numbers, and what has no column.
+        columns["case"] = pyarrow.array([case for case, _ in rows], pyarrow.string())
+        columns["truth"] = pyarrow.array([truth for _, truth in rows], pyarrow.string())
+        table = pyarrow.table(columns)
+        before, self.schema = self.schema, _united(self.schema, table.schema)
+        if self.schema != before:
+            self._widen()
+        path = self.path / f"part-{first:09}.parquet"
+        self._store(path, table)
+        self.parts[first] = path, len(rows)
 
 
 def _read(path: Path) -> list[Row]:
@@ -168,20 +233,6 @@ def _read(path: Path) -> list[Row]:
 
     table = pyarrow.parquet.read_table(path, columns=list(KEPT))
     return [list(row) for row in zip(*(table.column(name).to_pylist() for name in KEPT))]
-
-
-def _folder(out: StrPath, settings: str) -> Path:
-    import pyarrow.parquet
-
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in sorted(folder.glob("part-*.parquet"))[:1]:
-        stated = (pyarrow.parquet.read_schema(path).metadata or {}).get(SETTINGS)
-        if stated != settings.encode():
-            raise _onecycle.OnecycleError(
-                f"{folder} holds the results of another recipe, option, measure or version: name another folder"
-            )
-    return folder
 
 
 def _gaps(done: dict[int, int], count: int) -> Iterator[tuple[int, int]]:
@@ -195,32 +246,61 @@ def _gaps(done: dict[int, int], count: int) -> Iterator[tuple[int, int]]:
         yield at, count
 
 
-def _spread(
-    client: Client, tasks: Callable[[int], Any], submit: Callable[[Client, Any], Any], keep: Callable[[Any, Any], None]
-) -> None:
-    """Computes `submit(client, task)` for every task, with a few more waiting than the cluster has threads, and calls `keep(task, result)`
-    as results arrive, in any order. `tasks(threads)` returns the next task, cut for that number of threads; None if there is nothing to
-    hand out until another result has arrived."""
+def task_s(threads: int) -> float:
+    """Time that a task should take (s): of many workers so long that the client keeps up with them."""
+    return max(TASK_S, CLIENT_S * threads)
+
+
+def _spread(client: Client, tasks: Callable[[int], Any], work: Callable[[Any], tuple[Any, ...]], keep: Callable[[Any, Any], None]) -> None:
+    """Computes every task on the workers, with a few more waiting than the cluster has threads, and calls `keep(task, result)` as
+    results arrive, in any order. `tasks(threads)` returns the next task, cut for that number of threads; None if there is nothing to
+    hand out until another result has arrived. `work(task)` is a function and its arguments. Workers of another build are left out."""
     import distributed
     from distributed.comm.core import CommClosedError
 
     own: Any = None if client is not None else distributed.Client()  # type: ignore[no-untyped-call]
     client = client or own
     running: dict[str, Any] = {}
+    left_out: dict[str, str] = {}
+
+    def leave_out(worker: str, sentence: str) -> None:
+        if worker not in left_out:
+            left_out[worker] = sentence
+            warnings.warn(f"{sentence}: it is left out; install the same packages on both", stacklevel=2)
+
+    def workers() -> dict[str, int]:
+        """Threads of the workers that there are now, which come and go."""
+        there: dict[str, int] = client.nthreads()
+        kept = {worker: threads for worker, threads in there.items() if worker not in left_out}
+        if there and not kept:
+            raise _onecycle.OnecycleError(f"{next(iter(left_out.values()))}, and no other worker is left: install the same packages on both")
+        return kept
+
+    def submitted(task: Any) -> Any:
+        only = {"workers": list(workers())} if left_out else {}
+        future = client.submit(checked, build(), *work(task), retries=RETRIES, pure=False, **only)
+        running[future.key] = task
+        return future
 
     def following() -> list[Any]:
-        """Tasks for the workers that there are now, which come and go."""
         made: list[Any] = []
-        threads = max(1, sum(client.nthreads().values()))
+        threads = max(1, sum(workers().values()))
         while len(running) < AHEAD * threads and (task := tasks(threads)) is not None:
-            made.append(submit(client, task))
-            running[made[-1].key] = task
+            made.append(submitted(task))
         return made
 
     try:
+        for worker, of in client.run(build, on_error="return").items():
+            if sentence := _difference(build(), of, worker):
+                leave_out(worker, sentence)
         futures: Any = distributed.as_completed(following())  # type: ignore[no-untyped-call]
         for future in futures:
-            keep(running.pop(future.key), future.result())
+            task, result = running.pop(future.key), future.result()
+            if isinstance(result, _Refused):
+                leave_out(result.worker, result.sentence)
+                futures.add(submitted(task))
+            else:
+                keep(task, result)
             for more in following():
                 futures.add(more)
     except (distributed.CancelledError, CommClosedError, ConnectionError, TimeoutError) as error:
@@ -244,14 +324,15 @@ class Outcomes:
     ) -> None:
         self._text, self._options, self._count, self._parts, self._is_own = text, options, count, parts, is_own
 
-    @property
-    def _rows(self) -> list[Row]:
-        rows: list[Row] = []
-        for first in sorted(self._parts):
+    def _rows(self) -> Iterator[Row]:
+        """One part in memory at a time."""
+        at = 0
+        for first in sorted(first for first in self._parts if first < self._count):
             part = self._parts[first]
             # Those that a part before it has too are left out.
-            rows += (_read(part) if isinstance(part, Path) else part)[len(rows) - first :]
-        return rows[: self._count]
+            rows = (_read(part) if isinstance(part, Path) else part)[at - first : self._count - first]
+            at += len(rows)
+            yield from rows
 
     def __len__(self) -> int:
         return self._count
@@ -259,31 +340,33 @@ class Outcomes:
     @property
     def cases(self) -> list[Any]:
         """The outcome of every case."""
-        made = [json.loads(case) for case, _ in self._rows]
+        made = [json.loads(case) for case, _ in self._rows()]
         return [case["outcome"] for case in made] if self._is_own else made
 
     @property
     def truths(self) -> list[dict[str, Any]]:
         """What every case was made of: structure and parameters of the process, and disturbances."""
-        return [json.loads(truth) for _, truth in self._rows]
+        return [json.loads(truth) for _, truth in self._rows()]
 
     def to_json(self) -> str:
         """The text that `onecycle-lab campaign FILE --json` prints."""
         if self._is_own:
             return json.dumps({"cases": self.cases}, indent=2) + "\n"
-        lines = [case for case, _ in self._rows]
-        return str(_campaign(self._text, (*self._options, "--json")).text(lines))
+        return self._told((*self._options, "--json"))
+
+    def _told(self, options: tuple[str, ...]) -> str:
+        return str(_campaign(self._text, options).text(case for case, _ in self._rows()))
 
     def to_pandas(self) -> pandas.DataFrame:
         """One row for each case: its outcome, and its truth in columns that begin with `truth.`."""
         import pandas
 
-        return pandas.DataFrame([_of_row(row) for row in self._rows]).rename_axis("n")
+        return pandas.DataFrame([_of_row(row) for row in self._rows()]).rename_axis("n")
 
     def __str__(self) -> str:
         if self._is_own:
             return f"{self.to_pandas().describe().T.to_string()}\n"
-        return str(_campaign(self._text, self._options).text([case for case, _ in self._rows]))
+        return self._told(self._options)
 
 
 def _source(own: Own) -> str | None:
@@ -309,19 +392,11 @@ def run(
     # Not the number of cases: a finished campaign can be extended.
     decides = {"version": _onecycle.__version__, "settings": json.loads(campaign.settings()), "measure": _source(own)}
     settings = json.dumps(decides)
-    folder = None if out is None else _folder(out, settings)
+    folder = None if out is None else _Folder(out, settings)
     parts: dict[int, Path | list[Row]] = {}
-    done: dict[int, int] = {}
-    if folder:
-        import pyarrow.parquet
-
-        for path in folder.glob("part-*.parquet"):
-            first = int(path.stem.removeprefix("part-"))
-            parts[first], done[first] = path, pyarrow.parquet.read_metadata(path).num_rows
-    gaps = list(_gaps(done, count))
+    gaps = list(_gaps({first: rows for first, (_, rows) in folder.parts.items()} if folder else {}, count))
     missing = sum(end - first for first, end in gaps)
     left, began, timed, took_s = missing, 0, 0, 0.0
-    of_client = build()
 
     def cases_of_task(threads: int) -> int:
         if shard:
@@ -330,7 +405,7 @@ def run(
             return 1
         a_second = timed / max(took_s, 1e-6)
         # Smaller ones at the end, so that all workers end at the same time.
-        return max(1, int(min(TASK_S * a_second, max(LEAST_S * a_second, left / (2 * threads)))))
+        return max(1, int(min(task_s(threads) * a_second, max(LEAST_S * a_second, left / (2 * threads)))))
 
     def task(threads: int) -> tuple[int, int] | None:
         nonlocal left, began
@@ -345,17 +420,12 @@ def run(
         began += 1
         return first, end
 
-    def submit(client: Client, task: tuple[int, int]) -> Any:
-        return client.submit(shard_cases, of_client, text, options, *task, own, retries=RETRIES, pure=False)
-
     def keep(task: tuple[int, int], result: tuple[float, list[Row]]) -> None:
         nonlocal timed, took_s
         first, (seconds, rows) = task[0], result
         if folder:
             # Of a campaign with a folder, no outcome stays in memory.
-            path = folder / f"part-{first:09}.parquet"
-            _write(path, settings, first, rows)
-            parts[first] = path
+            folder.add(first, rows)
         else:
             parts[first] = rows
         timed, took_s = timed + len(rows), took_s + seconds
@@ -363,30 +433,46 @@ def run(
             progress(count - missing + timed, count)
 
     if missing:
-        _spread(client, task, submit, keep)
+        _spread(client, task, lambda task: (shard_cases, text, options, *task, own), keep)
     if folder:
-        _unify([part for part in parts.values() if isinstance(part, Path)])
+        parts |= {first: path for first, (path, _) in folder.parts.items()}
     return Outcomes(text, options, count, parts, own is not None)
 
 
-def dataset_file(of_client: tuple[str, str, str], manifest: str, number: int) -> Any:
+def dataset_file(manifest: str, number: int) -> Any:
     """Bytes and number of examples of a file of a dataset. Runs on a worker."""
-    check(of_client)
     return _lab.dataset_file(manifest, number)
 
 
+@lru_cache(maxsize=1)
+def _sets(recipe: str) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "recipe.toml")
+        path.write_text(recipe, encoding="utf-8")
+        return _lab.ClassifierSets(str(path))
+
+
+def examples_of(recipe: str, number: int, first: int, end: int) -> Any:
+    """Inputs, classes and costs of some experiments of a set of a classifier. Runs on a worker."""
+    return _sets(recipe).part(number, first, end)
+
+
 def fill(
-    recipe: StrPath | None, examples: int, into: StrPath, client: Client = None, progress: Progress = None, restart: bool = False
+    recipe: StrPath | None, examples: int | None, into: StrPath, client: Client = None, progress: Progress = None,
+    restart: bool = False,
 ) -> Path:
+    if recipe is not None and _lab.ClassifierSets.is_recipe(os.fspath(recipe)):
+        if examples is not None:
+            raise _onecycle.OnecycleError("a classifier's recipe says how many experiments there are: leave out `examples`")
+        return _fill_sets(os.fspath(recipe), Path(into), client, progress, restart)
+    if examples is None:
+        raise _onecycle.OnecycleError("give the number of experiments: `examples`")
     words = [f"--examples={examples}", f"--into={os.fspath(into)}"] + ["--restart"] * bool(restart)
     folder = _lab.Dataset(None if recipe is None else os.fspath(recipe), words)
     manifest = folder.manifest()
     missing = folder.missing()
     left = iter(missing)
     kept = 0
-
-    def submit(client: Client, number: int) -> Any:
-        return client.submit(dataset_file, build(), manifest, number, retries=RETRIES, pure=False)
 
     def keep(number: int, made: Any) -> None:
         nonlocal kept
@@ -396,5 +482,46 @@ def fill(
             progress(kept, len(missing))
 
     if missing:
-        _spread(client, lambda threads: next(left, None), submit, keep)
+        _spread(client, lambda threads: next(left, None), lambda number: (dataset_file, manifest, number), keep)
     return Path(into)
+
+
+def _fill_sets(recipe: str, into: Path, client: Client, progress: Progress, restart: bool) -> Path:
+    """The sets of the paper's classifier. What is finished waits in a folder beside them."""
+    # Names the file in its errors.
+    sets = _lab.ClassifierSets(recipe)
+    text = Path(recipe).read_text(encoding="utf-8")
+    sizes = [size for _, size in sets.sizes()]
+    made_of = hashlib.sha256(json.dumps([_onecycle.__version__, text]).encode()).hexdigest()[:16]
+    waiting = into / f"part-{made_of}"
+    if restart and waiting.exists():
+        shutil.rmtree(waiting)
+    waiting.mkdir(parents=True, exist_ok=True)
+
+    def path(number: int, first: int) -> Path:
+        return waiting / f"{number}-{first}.npz"
+
+    parts = [(number, first, min(first + EXAMPLES, size)) for number, size in enumerate(sizes) for first in range(0, size, EXAMPLES)]
+    missing = [part for part in parts if not path(*part[:2]).exists()]
+    left, kept = iter(missing), len(parts) - len(missing)
+
+    def keep(part: tuple[int, int, int], made: Any) -> None:
+        nonlocal kept
+        begun = waiting / "begun"
+        with begun.open("wb") as file:
+            np.savez(file, *made)
+        begun.replace(path(*part[:2]))
+        kept += 1
+        if progress:
+            progress(kept, len(parts))
+
+    if missing:
+        _spread(client, lambda threads: next(left, None), lambda part: (examples_of, text, *part), keep)
+
+    def whole(number: int) -> tuple[Any, ...]:
+        files = [np.load(path(*part[:2])) for part in parts if part[0] == number]
+        return tuple(np.concatenate([file[name] for file in files]) for name in ("arr_0", "arr_1", "arr_2"))
+
+    sets.write(str(into), [whole(number) for number in range(len(sizes))])
+    shutil.rmtree(waiting)
+    return into

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import tempfile
 from dataclasses import dataclass
 from math import comb, factorial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _onecycle
 from ._onecycle import OnecycleError
-from ._options import ExperimentOptions, settings
+from ._options import ExperimentOptions, as_keywords, settings
 from ._recording import Recording, _column
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import control
     import scipy.signal
     from numpy.typing import ArrayLike, NDArray
@@ -206,6 +210,15 @@ def _model(state: Any) -> Model:
 
 
 @dataclass(frozen=True)
+class Interval:
+    """Estimate and 90 % interval of a parameter; None is unbounded."""
+
+    estimate: float | None
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
 class Margins:
     """Stability margins of a loop; all but `is_stable` are None of an unstable one."""
 
@@ -232,27 +245,39 @@ def step(model: Model, controller: Controller) -> tuple[NDArray[np.float64], NDA
     return t, y, u
 
 
-def experiment(model: Model, options: ExperimentOptions) -> Recording:
+def _simulate(function: str, model: Model, options: ExperimentOptions, *more: str) -> str:
+    """What `onecycle simulate` prints."""
     from .__main__ import program
 
     keys = model.parameters
     if "k" in keys:
         # Of both gains the one that is finite.
         keys.pop("k" if np.isinf(keys["k"]) else "k_over_t_body", None)
-    words = [f"--process={model.structure}"]
+    words = [f"--process={model.structure}", *more]
     for key, value in keys.items():
         # The option is the key without its unit: `t_prop_s` is `--t-prop`.
         words.append(f"--{re.sub('(_rad_per)?_s$', '', key).replace('_', '-')}={value!r}")
-    for name, text in settings("experiment", ExperimentOptions, options):
+    for name, text in settings(function, ExperimentOptions, options):
         option = f"--{name.replace('_', '-')}"
         words += {"true": [option], "false": []}.get(text, [f"{option}={text}"])
+    run = subprocess.run([program(), "simulate", *words], capture_output=True, text=True)
+    if run.returncode != 0:
+        sentence = run.stderr.strip().removeprefix("error: ").removeprefix("onecycle: ").split("\n\n")[0]
+        raise _refused(as_keywords(sentence))
+    return run.stdout
+
+
+def experiment(model: Model, options: ExperimentOptions) -> Recording:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "experiment.csv")
-        run = subprocess.run([program(), "simulate", *words, "--out", path], capture_output=True, text=True)
-        if run.returncode != 0:
-            sentence = run.stderr.strip().removeprefix("error: ").removeprefix("onecycle: ").split("\n\n")[0]
-            raise _refused(re.sub(r"--([a-z][a-z0-9-]*)", lambda found: f"`{found[1].replace('-', '_')}`", sentence))
+        _simulate("experiment", model, options, f"--out={path}")
         return Recording._of("experiment", _onecycle.read(path, []))
+
+
+def expect(model: Model, options: ExperimentOptions) -> Mapping[str, Interval]:
+    known = json.loads(_simulate("expect", model, options, "--expect", "--json"))
+    ends = ("estimate", "low", "high")
+    return MappingProxyType({key: Interval(*(of[end] for end in ends)) for key, of in known.items() if key != "structure"})
 
 
 def simulate(model: Model, u: ArrayLike, sample_s: float) -> NDArray[np.float64]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import os
+import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
+from functools import lru_cache
 from operator import index
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Union
 
@@ -204,6 +208,26 @@ class ExperimentOptions(TypedDict, total=False):
     """Seed of noise, disturbances and jitter; else 0."""
 
 
+class CampaignOptions(TypedDict, total=False):
+    """The keywords of `campaign`, instead of what its file says."""
+
+    cases: int
+    """Number of cases, 1 to ten million."""
+    cycles: int
+    """Number of cycles to fit, 1 to 50."""
+    method: Literal["map", "refine", "classify"]
+    """Identification method."""
+    sigma: Share
+    """Standard deviation of the noise, as a share of the amplitude."""
+    time_scale: float
+    """Factor of all times, the sample period included."""
+
+
+def as_keywords(sentence: str) -> str:
+    """A sentence of the program with its options as keywords."""
+    return re.sub(r"--([a-z][a-z0-9-]*)(?: <[A-Z,_]+>)?", lambda found: f"`{found[1].replace('-', '_')}`", sentence)
+
+
 def _text(name: str, value: Any) -> str:
     """A value as the settings of the library have it."""
     if getattr(value, "ndim", None) == 0:
@@ -245,6 +269,25 @@ def _source(annotation: Any) -> str:
     return str(getattr(annotation, "__forward_arg__", annotation))
 
 
+@lru_cache(maxsize=1)
+def _notes() -> dict[str, dict[str, str]]:
+    """What stands below the keywords of each class of this file, and of those that it extends."""
+    try:
+        body = ast.parse(inspect.getsource(sys.modules[__name__])).body
+    except (OSError, TypeError):
+        return {}
+    notes: dict[str, dict[str, str]] = {}
+    for kind in body:
+        if isinstance(kind, ast.ClassDef):
+            of = notes[kind.name] = {}
+            for base in kind.bases:
+                of |= notes.get(getattr(base, "id", ""), {})
+            for keyword, note in zip(kind.body, kind.body[1:]):
+                if isinstance(keyword, ast.AnnAssign) and isinstance(note, ast.Expr):
+                    of[ast.unparse(keyword.target)] = inspect.cleandoc(ast.literal_eval(note.value))
+    return notes
+
+
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -254,9 +297,12 @@ def keywords(kind: Any) -> Callable[[F], F]:
     def shown(function: F) -> F:
         signature = inspect.signature(function)
         fixed = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
-        notes = inspect.get_annotations(kind)
-        named = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_source(notes[name])) for name in notes]
+        types = inspect.get_annotations(kind)
+        named = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_source(types[name])) for name in types]
         function.__signature__ = signature.replace(parameters=[*fixed, *named])  # type: ignore[attr-defined]
+        notes = _notes().get(kind.__name__, {})
+        about = "".join(f"\n{name} : {_source(types[name])}\n    {notes[name]}" for name in types if name in notes)
+        function.__doc__ = f"{inspect.cleandoc(function.__doc__ or '')}\n\nKeywords\n--------{about}\n"
         return function
 
     return shown

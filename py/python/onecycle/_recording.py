@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import date, datetime, timedelta
+from datetime import date, datetime, timedelta, timezone
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,11 +62,20 @@ def _of_objects(array: NDArray[np.object_]) -> NDArray[Any]:
     try:
         if isinstance(first, date) and not isinstance(first, datetime):
             return array.astype("datetime64[D]")
-        if isinstance(first, timedelta):
-            return array.astype("timedelta64[us]")
-        return np.array([value - first for value in array]).astype("timedelta64[us]")
-    except (TypeError, ValueError):
+        if isinstance(first, datetime):
+            # In UTC: with one zone, Python takes the difference of what the clocks on the wall show.
+            if any((value.tzinfo is None) != (first.tzinfo is None) for value in array):
+                raise ValueError
+            array = np.array([value if value.tzinfo is None else value.astimezone(timezone.utc) for value in array], dtype=object)
+            array = array - array[0]
+        # Those of pandas have nanoseconds.
+        return np.array([_nanoseconds(value) for value in array], dtype=object).astype(np.int64).astype("timedelta64[ns]")
+    except (AttributeError, OverflowError, TypeError, ValueError):
         raise _refused("`t` mixes kinds of time: give dates with a zone, dates without, or durations") from None
+
+
+def _nanoseconds(of: timedelta) -> int:
+    return (of.days * 86_400 + of.seconds) * 10**9 + of.microseconds * 1000 + getattr(of, "nanoseconds", 0)
 
 
 class Recording:

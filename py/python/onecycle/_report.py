@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import numpy as np
 
 from . import _onecycle
-from ._model import Controller, Model
+from ._model import Controller, Interval, Model
 from ._onecycle import OnecycleError
 from ._recording import Recording
 
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def _arrays(columns: list[tuple[str, NDArray[np.float64]]]) -> dict[str, NDArray[np.float64]]:
+def _arrays(columns: list[tuple[str, NDArray[np.float64]]]) -> Arrays:
     for _, values in columns:
         values.flags.writeable = False
-    return dict(columns)
+    return MappingProxyType(dict(columns))
 
 
 def bare(source: Any) -> Any:
@@ -116,10 +116,18 @@ class _Shown:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in self._kept}
+        kept = {name: getattr(self, name) for name in self._kept}
+        return {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in kept.items()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        # Everything that is a dict is shown read-only; arrays forget in a pickle that they are.
+        for name, value in state.items():
+            if isinstance(value, dict):
+                for array in value.values():
+                    if isinstance(array, np.ndarray):
+                        array.flags.writeable = False
+                value = MappingProxyType(value)
+            self.__dict__[name] = value
 
 
 @dataclass(frozen=True)
@@ -148,15 +156,6 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Interval:
-    """Estimate and 90 % interval of a parameter; None is unbounded."""
-
-    estimate: float | None
-    low: float | None
-    high: float | None
-
-
-@dataclass(frozen=True)
 class Bands:
     """A frequency response with pointwise bands; arrays over `w`."""
 
@@ -182,7 +181,7 @@ class Report(_Shown):
     _kept = (*_Shown._kept, "_data", "posterior", "rows", "recording", "took_s")
 
     @cached_property
-    def _data(self) -> dict[str, Any]:
+    def _data(self) -> Mapping[str, Any]:
         """What is cheap to read."""
         inner: _onecycle.Found = self._inner
         model, controller, answer = inner.model(), inner.controller(), json.loads(inner.answer())
@@ -234,15 +233,15 @@ class Report(_Shown):
         """Estimate of every parameter, by key; infinite where no damping is seen."""
         return {key: np.inf if of.estimate is None else of.estimate for key, of in self.intervals.items()}
 
-    def conf_int(self, level: float = 0.9) -> pandas.DataFrame | dict[str, tuple[float, float]]:
-        """Ends of the central interval of every parameter: a DataFrame with the columns `low` and `high` if pandas is installed, else
-        a dict of pairs. Of 90 % they are those of the report; of other levels quantiles of the draws, not inside (or outside) of them."""
+    def conf_int(self, level: float = 0.9) -> pandas.DataFrame:
+        """Ends of the central interval of every parameter: a DataFrame with the columns `low` and `high`; without pandas, a dict of
+        pairs. Of 90 % they are those of the report; of other levels quantiles of the draws, not inside (or outside) of them."""
         _check_level(level)
         found = {key: self._ends(key, of, level) for key, of in self.intervals.items()}
         try:
             import pandas
         except ImportError:
-            return found
+            return found  # type: ignore[return-value]
         return pandas.DataFrame.from_dict(found, orient="index", columns=["low", "high"])
 
     def _ends(self, key: str, of: Interval, level: float) -> tuple[float, float]:
@@ -399,9 +398,9 @@ class Design(_Shown):
         return Controller(**self._inner.controller())
 
     @cached_property
-    def controllers(self) -> dict[str, Controller | None]:
+    def controllers(self) -> Mapping[str, Controller | None]:
         """The controller of every style, to choose from; None if it has none."""
-        return {style: None if law is None else Controller(**law) for style, law in self._inner.controllers()}
+        return MappingProxyType({style: None if law is None else Controller(**law) for style, law in self._inner.controllers()})
 
     def __repr__(self) -> str:
         return f"<Design {self.controller!r}>"

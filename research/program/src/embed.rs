@@ -2,6 +2,9 @@
 //!
 //! Options are those of the command line, such as `["--cases", "100"]`. An error is one sentence.
 
+use std::ops::Range;
+use std::path::Path;
+
 use onecycle_cli::args;
 use onecycle_cli::failure::Failure;
 use onecycle_cli::style::plain;
@@ -13,6 +16,7 @@ use serde_json::Value;
 use crate::args::{Arguments, Command};
 use crate::commands::campaign::{self, plan};
 use crate::commands::dataset;
+use crate::commands::dataset::classifier::{self, Rows, Sets};
 use crate::commands::dataset::folder::Folder;
 
 /// A campaign, whose cases depend on the file, the options and their number only: they can be computed anywhere and in any
@@ -67,11 +71,12 @@ impl Campaign {
         self.plan.line(n).map_err(|failure| failure.to_string())
     }
 
-    /// The recording of case `n`, which it is judged by, and its truth as JSON on one line.
+    /// The recording of case `n`, which it is judged by, and its truth as JSON on one line. `None`: nothing oscillates, or the
+    /// output runs away.
     ///
     /// # Errors
     /// As [`case`](Self::case).
-    pub fn recording(&self, n: u64) -> Result<(Columns, String), String> {
+    pub fn recording(&self, n: u64) -> Result<(Option<Columns>, String), String> {
         self.check(n)?;
         let recording = self.plan.recording(n);
         recording.map_err(|failure| failure.to_string())
@@ -89,14 +94,7 @@ impl Campaign {
     ///
     /// # Errors
     /// One sentence: these are not the outcomes of this campaign.
-    pub fn text(&self, cases: &[String]) -> Result<String, String> {
-        if cases.len() as u64 != self.count() {
-            return Err(format!(
-                "{} outcomes of {} cases",
-                cases.len(),
-                self.count()
-            ));
-        }
+    pub fn text(&self, cases: &mut dyn Iterator<Item = String>) -> Result<String, String> {
         let settings = self.is_json.then_some(&self.settings);
         let text = self.plan.text(settings, cases);
         text.map(|text| plain(&text))
@@ -149,6 +147,69 @@ impl Dataset {
         }
         let kept = self.0.keep(file, bytes, Entry::of(rows, bytes));
         kept.map_err(|failure| failure.to_string())
+    }
+}
+
+/// Examples of the paper's classifier: their inputs, as they were measured, their classes, and the costs of all classes.
+pub type Examples = (Vec<f32>, Vec<u64>, Vec<f32>);
+
+/// The sets of a recipe of the paper's classifier, whose parts are made by others.
+pub struct ClassifierSets(Sets);
+
+impl ClassifierSets {
+    /// Whether a file is the recipe of a classifier.
+    ///
+    /// # Errors
+    /// One sentence: the file cannot be read.
+    pub fn is_recipe(file: &str) -> Result<bool, String> {
+        classifier::is_recipe(Path::new(file)).map_err(|failure| failure.to_string())
+    }
+
+    /// Reads the recipe and makes its classes in this thread.
+    ///
+    /// # Errors
+    /// One sentence: the recipe cannot be used.
+    pub fn read(file: &str) -> Result<Self, String> {
+        let sets = Sets::read(Path::new(file), &OneThread);
+        sets.map(Self).map_err(|failure| failure.to_string())
+    }
+
+    /// Names of the sets, with their numbers of experiments.
+    #[must_use]
+    pub fn sizes(&self) -> Vec<(String, u64)> {
+        self.0.sizes()
+    }
+
+    /// Makes the experiments of these numbers of a set in this thread. One that does not come to a steady oscillation gives no
+    /// example.
+    ///
+    /// # Errors
+    /// One sentence: there are no such experiments, or one cannot be made.
+    pub fn part(&self, set: usize, numbers: Range<u64>) -> Result<Examples, String> {
+        let sizes = self.sizes();
+        let is_there =
+            |(_, size): &(String, u64)| numbers.start <= numbers.end && numbers.end <= *size;
+        if !sizes.get(set).is_some_and(is_there) {
+            return Err(format!("there are no experiments {numbers:?} of set {set}"));
+        }
+        let made = self.0.part(set, numbers, &OneThread);
+        let made = made.map_err(|failure| failure.to_string())?;
+        Ok((made.inputs, made.labels, made.costs))
+    }
+
+    /// Writes the files of `onecycle-lab dataset` from the examples of every set.
+    ///
+    /// # Errors
+    /// One sentence: a file cannot be written.
+    pub fn write(&self, into: &str, sets: Vec<Examples>) -> Result<(), String> {
+        let rows = |(inputs, labels, costs)| Rows {
+            inputs,
+            labels,
+            costs,
+        };
+        let sets = sets.into_iter().map(rows).collect();
+        let written = self.0.write(Path::new(into), sets);
+        written.map(|_| ()).map_err(|failure| failure.to_string())
     }
 }
 

@@ -9,7 +9,7 @@ mod waited;
 
 use std::sync::Arc;
 
-use numpy::{IntoPyArray, PyArray1};
+use numpy::{IntoPyArray, PyArray1, PyArrayMethods};
 use onecycle_lab_cli::embed as lab;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
@@ -60,19 +60,26 @@ impl Campaign {
         cases.map_err(refused)
     }
 
-    /// Time (s), input and output of case `n`, and its truth as JSON on one line.
-    fn recording<'py>(&self, py: Python<'py>, n: u64) -> PyResult<(Columns<'py>, String)> {
+    /// Time (s), input and output of case `n`, or `None` if it has no recording, and its truth as JSON on one line.
+    fn recording<'py>(&self, py: Python<'py>, n: u64) -> PyResult<(Option<Columns<'py>>, String)> {
         let campaign = Arc::clone(&self.0);
         let made = waited(py, move || campaign.recording(n))?;
         let (of, truth) = made.map_err(refused)?;
-        let columns = [of.time_s, of.input, of.output];
-        Ok((columns.map(|values| values.into_pyarray(py)), truth))
+        let columns = of.map(|of| [of.time_s, of.input, of.output]);
+        let columns = columns.map(|columns| columns.map(|values| values.into_pyarray(py)));
+        Ok((columns, truth))
     }
 
-    /// What the program prints for the outcomes of all cases.
-    fn text(&self, py: Python<'_>, cases: Vec<String>) -> PyResult<String> {
-        let campaign = Arc::clone(&self.0);
-        waited(py, move || campaign.text(&cases))?.map_err(refused)
+    /// What the program prints for the outcomes of all cases, which an iterator brings as JSON.
+    fn text(&self, cases: &Bound<'_, PyAny>) -> PyResult<String> {
+        let mut failed = None;
+        let mut cases = (cases.try_iter()?)
+            .map(|case| case.and_then(|case| case.extract()))
+            .map_while(|case: PyResult<String>| case.map_err(|error| failed = Some(error)).ok());
+        let text = self.0.text(&mut cases);
+        drop(cases);
+        failed.map_or(Ok(()), Err)?;
+        text.map_err(refused)
     }
 }
 
@@ -101,6 +108,58 @@ impl Dataset {
     }
 }
 
+type Rows<'py> = (
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f32>>,
+);
+
+/// The sets of a recipe of the paper's classifier, whose parts can be made anywhere.
+#[pyclass(frozen, module = "onecycle_lab")]
+struct ClassifierSets(Arc<lab::ClassifierSets>);
+
+#[pymethods]
+impl ClassifierSets {
+    #[new]
+    fn new(py: Python<'_>, file: String) -> PyResult<Self> {
+        let sets = waited(py, move || lab::ClassifierSets::read(&file))?;
+        Ok(Self(Arc::new(sets.map_err(refused)?)))
+    }
+
+    /// Whether a file is the recipe of a classifier.
+    #[staticmethod]
+    fn is_recipe(file: &str) -> PyResult<bool> {
+        lab::ClassifierSets::is_recipe(file).map_err(refused)
+    }
+
+    /// Names of the sets, with their numbers of experiments.
+    fn sizes(&self) -> Vec<(String, u64)> {
+        self.0.sizes()
+    }
+
+    /// Inputs, classes and costs of the experiments from `first` to before `end` of a set, each row by row.
+    fn part<'py>(&self, py: Python<'py>, set: usize, first: u64, end: u64) -> PyResult<Rows<'py>> {
+        let sets = Arc::clone(&self.0);
+        let made = waited(py, move || sets.part(set, first..end))?;
+        let (inputs, labels, costs) = made.map_err(refused)?;
+        Ok((
+            inputs.into_pyarray(py),
+            labels.into_pyarray(py),
+            costs.into_pyarray(py),
+        ))
+    }
+
+    /// Writes the files of all sets.
+    fn write(&self, py: Python<'_>, into: String, sets: Vec<Rows<'_>>) -> PyResult<()> {
+        let sets = sets.iter().map(|(inputs, labels, costs)| {
+            Ok((inputs.to_vec()?, labels.to_vec()?, costs.to_vec()?))
+        });
+        let sets = sets.collect::<PyResult<Vec<_>>>()?;
+        let all = Arc::clone(&self.0);
+        waited(py, move || all.write(&into, sets))?.map_err(refused)
+    }
+}
+
 /// Bytes and number of examples of a file.
 #[pyfunction]
 fn dataset_file<'py>(
@@ -117,6 +176,7 @@ fn dataset_file<'py>(
 fn _lab(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Campaign>()?;
     module.add_class::<Dataset>()?;
+    module.add_class::<ClassifierSets>()?;
     module.add_function(wrap_pyfunction!(dataset_file, module)?)?;
     Ok(())
 }

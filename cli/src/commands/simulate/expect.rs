@@ -8,12 +8,12 @@ use onecycle_plant::Noise as Source;
 use super::plan::{self, LARGEST, Plan};
 use crate::args::Simulate;
 use crate::failure::Failure;
-use crate::report::text;
+use crate::report::{json, text};
 
 /// Largest number of samples of a test to plan.
 const MOST_SAMPLES: f64 = 4e6;
 
-/// Table of the parameters with the intervals to expect.
+/// Table of the parameters with the intervals to expect, or JSON.
 pub(super) fn text(arguments: &Simulate, plan: &Plan) -> Result<String, Failure> {
     let sigma = plan.experiment.sensor.noise_sigma;
     if sigma <= 0.0 {
@@ -50,7 +50,10 @@ pub(super) fn text(arguments: &Simulate, plan: &Plan) -> Result<String, Failure>
             "this test does not tell the parameters: excite the process longer, stronger or at more frequencies",
         )
     })?;
-    Ok(text::expected(&plan.model, &estimate))
+    Ok(match arguments.json {
+        true => json::to_text(&onecycle::json::parameters(&estimate)),
+        false => text::expected(&plan.model, &estimate),
+    })
 }
 
 /// Input of the process during the test with its bias, one value a sample: a loop cancels the bias, and a mean of the

@@ -36,6 +36,8 @@ mod input;
 mod scoring;
 mod standard;
 
+use std::ops::Range;
+
 use onecycle_onboard::SoiptdError;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -354,28 +356,21 @@ impl ClassifierRecipe {
         }
     }
 
-    fn make(
-        &self,
-        of: (&Trials, u64),
-        processes: Processes,
-        classes: &Classes,
-        workers: &dyn Workers,
-    ) -> Result<Examples, ClassifierError> {
-        let reading = Reading {
-            gain: self.gain,
-            fit: self.fit,
-            label: self.label,
-        };
-        let examples = Examples::make(of, processes, (classes, reading), workers)?;
-        Ok(examples.thinned(self.every))
-    }
-
     /// Scaling of the inputs, from the examples to learn from.
     #[must_use]
     pub fn scaled(&self, training: &Examples) -> Standard {
+        self.scaled_rows(training.inputs(), training.rows())
+    }
+
+    /// The same from the rows of this many inputs.
+    pub fn scaled_rows(
+        &self,
+        inputs: usize,
+        rows: impl Iterator<Item = impl AsRef<[f32]>>,
+    ) -> Standard {
         match self.scaling {
-            Scaling::Standard => Standard::of(training),
-            Scaling::Centred => Standard::centred(training),
+            Scaling::Standard => Standard::of(inputs, rows),
+            Scaling::Centred => Standard::centred(inputs, rows),
         }
     }
 
@@ -387,50 +382,74 @@ impl ClassifierRecipe {
         Classes::priced(&Grid::build(&self.grid(), workers)?, self.price)
     }
 
-    /// Examples to learn from.
+    /// The sets, by name, with their numbers of experiments: to learn from; to choose the best epoch with, as many of every
+    /// class; and the tests.
+    #[must_use]
+    pub fn sets(&self, classes: &Classes) -> Vec<(String, u64)> {
+        let tests = (1..).zip(&self.tests);
+        let tests = tests.map(|(number, test): (u32, _)| (format!("test_{number}"), test.systems));
+        let verification = self.verification * classes.len() as u64;
+        let first = [("training", self.examples), ("verification", verification)];
+        (first.into_iter())
+            .map(|(name, size)| (name.to_owned(), size))
+            .chain(tests)
+            .collect()
+    }
+
+    /// Examples of a set, by its place in [`sets`](Self::sets): those of the experiments of these numbers. Panics if there is no
+    /// such set.
     ///
     /// # Errors
     /// [`ClassifierError`]: a process has no controller.
-    pub fn training(
+    pub fn part(
         &self,
+        set: usize,
+        numbers: Range<u64>,
         classes: &Classes,
         workers: &dyn Workers,
     ) -> Result<Examples, ClassifierError> {
-        let trials = self.trials(Purpose::Training, self.seed, self.protocol);
-        let processes = match self.class_every {
-            0 => Processes::Random,
-            every => Processes::RandomAndClasses { every },
+        let (purpose, seed, protocol) = match set {
+            0 => (Purpose::Training, self.seed, self.protocol),
+            1 => (Purpose::Verification, self.seed, self.protocol),
+            _ => {
+                let test = &self.tests[set - 2];
+                (Purpose::Test, test.seed, test.protocol)
+            }
         };
-        self.make((&trials, self.examples), processes, classes, workers)
+        let processes = match (purpose, self.class_every) {
+            (Purpose::Verification, _) => Processes::Classes,
+            (Purpose::Test, _) | (Purpose::Training, 0) => Processes::Random,
+            (Purpose::Training, every) => Processes::RandomAndClasses { every },
+        };
+        let reading = Reading {
+            gain: self.gain,
+            fit: self.fit,
+            label: self.label,
+        };
+        let trials = self.trials(purpose, seed, protocol);
+        let of = (&trials, numbers);
+        let examples = Examples::make(of, processes, (classes, reading), workers)?;
+        Ok(examples.thinned(self.every))
     }
 
-    /// Examples to choose the best epoch with: the same number of every class.
+    /// All sets, in the order of [`sets`](Self::sets).
     ///
     /// # Errors
     /// [`ClassifierError`]: a process has no controller.
-    pub fn verification(
+    pub fn all_sets(
         &self,
         classes: &Classes,
         workers: &dyn Workers,
-    ) -> Result<Examples, ClassifierError> {
-        let trials = self.trials(Purpose::Verification, self.seed, self.protocol);
-        let count = self.verification * classes.len() as u64;
-        self.make((&trials, count), Processes::Classes, classes, workers)
+    ) -> Result<Vec<Examples>, ClassifierError> {
+        (self.sets(classes).iter().enumerate())
+            .map(|(set, (_, size))| self.part(set, 0..*size, classes, workers))
+            .collect()
     }
 
-    /// Examples of a test.
-    ///
-    /// # Errors
-    /// [`ClassifierError`]: a process has no controller.
-    pub fn test(
-        &self,
-        test: &Test,
-        classes: &Classes,
-        workers: &dyn Workers,
-    ) -> Result<Examples, ClassifierError> {
-        let trials = self.trials(Purpose::Test, test.seed, test.protocol);
-        let count = (&trials, test.systems);
-        self.make(count, Processes::Random, classes, workers)
+    /// Number of inputs of the network.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        INPUTS / self.every.max(1)
     }
 
     fn layers(&self, outputs: usize) -> Vec<Layer> {
@@ -454,8 +473,11 @@ impl ClassifierRecipe {
     pub fn network(&self, number: usize, classes: usize) -> Result<Network, ClassifierError> {
         let mut rng = Pcg64Mcg::seed_from_u64(self.seed);
         let outputs = self.losses[number].loss.outputs().unwrap_or(classes);
-        let inputs = INPUTS / self.every.max(1);
-        Ok(Network::new(inputs, &self.layers(outputs), &mut rng)?)
+        Ok(Network::new(
+            self.inputs(),
+            &self.layers(outputs),
+            &mut rng,
+        )?)
     }
 
     /// Settings of the training with loss `number`; panics if there is none.

@@ -363,7 +363,7 @@ fn examples_are_what_they_say() {
     let trials = trials(SPACE, 0.03, Protocol::Both);
     let make = |count, processes| {
         Examples::make(
-            (&trials, count),
+            (&trials, 0..count),
             processes,
             (&classes, Reading::default()),
             &OneThread,
@@ -417,7 +417,7 @@ fn labels_of_the_paper() {
     };
     let count = 2 * classes.len();
     let examples = Examples::make(
-        (&trials, count as u64),
+        (&trials, 0..count as u64),
         Processes::Classes,
         (&classes, reading),
         &OneThread,
@@ -457,7 +457,7 @@ fn scores_of_the_best_picks() {
     let classes = classes();
     let trials = trials(SPACE, 0.03, Protocol::Trimmed);
     let examples = Examples::make(
-        (&trials, 40),
+        (&trials, 0..40),
         Processes::Random,
         (&classes, Reading::default()),
         &OneThread,
@@ -500,7 +500,7 @@ fn coordinates_of_a_regression() {
     let classes = classes();
     let trials = trials(SPACE, 0.0, Protocol::Trimmed);
     let with = (&classes, Reading::default());
-    let examples = Examples::make((&trials, 5), Processes::Random, with, &OneThread).unwrap();
+    let examples = Examples::make((&trials, 0..5), Processes::Random, with, &OneThread).unwrap();
     let mut batch = Batch::default();
     examples.fill(&[0, 1, 2, 3, 4], &mut batch);
     for i in 0..5 {

@@ -1,6 +1,6 @@
 //! `onecycle-lab dataset`: simulate experiments to train on, one file at a time on all threads.
 
-mod classifier;
+pub(crate) mod classifier;
 pub(crate) mod folder;
 
 use std::path::Path;

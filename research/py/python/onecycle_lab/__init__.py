@@ -1,5 +1,5 @@
 """Campaigns and training sets of the research; `onecycle.campaign` and `onecycle.dataset` share them out."""
 
-from ._lab import Campaign, Dataset, dataset_file
+from ._lab import Campaign, ClassifierSets, Dataset, dataset_file
 
-__all__ = ["Campaign", "Dataset", "dataset_file"]
+__all__ = ["Campaign", "ClassifierSets", "Dataset", "dataset_file"]

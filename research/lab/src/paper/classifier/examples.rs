@@ -1,6 +1,8 @@
 //! Examples: trials with the inputs of the network, the class that fits best, and the costs of all
 //! others.
 
+use std::ops::Range;
+
 use onecycle_onboard::{Pd, Soiptd};
 
 use super::ClassifierError;
@@ -123,19 +125,20 @@ impl Processes {
 }
 
 impl Examples {
-    /// The examples of this number of trials.
+    /// The examples of the trials of these numbers. Those of a trial depend on its number alone.
     ///
     /// # Errors
     /// Where a process has no controller.
     pub fn make(
-        (trials, count): (&Trials, u64),
+        (trials, numbers): (&Trials, Range<u64>),
         processes: Processes,
         (classes, reading): (&Classes, Reading),
         workers: &dyn Workers,
     ) -> Result<Self, ClassifierError> {
         let Reading { gain, fit, .. } = reading;
-        let made = workers.map(count as usize, |n| {
-            let n = n as u64;
+        let count = numbers.end - numbers.start;
+        let made = workers.map(count as usize, |k| {
+            let n = numbers.start + k as u64;
             let class = processes.class(n, classes.len());
             let trial = trials.trial(n, class.map(|class| classes.times_s(class)))?;
             trial
@@ -231,9 +234,13 @@ impl Examples {
         })
     }
 
-    /// Writes the inputs of example `i`.
-    pub(super) fn fill_inputs(&self, i: usize, row: &mut [f32]) {
-        self.examples[i].prepared.fill(row);
+    /// The inputs of every example, one after the other.
+    pub fn rows(&self) -> impl Iterator<Item = Vec<f32>> {
+        self.examples.iter().map(|one| {
+            let mut row = vec![0.0; self.inputs];
+            one.prepared.fill(&mut row);
+            row
+        })
     }
 
     /// How the gain of a class is found.

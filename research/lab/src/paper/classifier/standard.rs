@@ -40,34 +40,40 @@ pub struct Standardised<'a> {
 }
 
 impl Standard {
-    /// These examples less their mean alone, as the authors' published code has it.
+    /// These rows of inputs less their mean alone, as the authors' published code has it.
     #[must_use]
-    pub fn centred(examples: &Examples) -> Self {
-        let mut this = Self::of(examples);
+    pub fn centred(inputs: usize, rows: impl Iterator<Item = impl AsRef<[f32]>>) -> Self {
+        let mut this = Self::of(inputs, rows);
         this.deviation.fill(1.0);
         this
     }
 
-    /// Standard coordinates of these examples.
+    /// Standard coordinates of these rows of inputs.
     #[must_use]
-    pub fn of(examples: &Examples) -> Self {
-        let inputs = examples.inputs();
-        let mut row = vec![0.0_f32; inputs];
+    pub fn of(inputs: usize, rows: impl Iterator<Item = impl AsRef<[f32]>>) -> Self {
         let (mut sums, mut squares) = (vec![0.0; inputs], vec![0.0; inputs]);
-        for i in 0..examples.len() {
-            examples.fill_inputs(i, &mut row);
-            for (k, value) in row.iter().enumerate() {
+        let mut count = 0_u64;
+        for row in rows {
+            count += 1;
+            for (k, value) in row.as_ref().iter().enumerate() {
                 let value = f64::from(*value);
                 sums[k] += value;
                 squares[k] += value * value;
             }
         }
-        let count = examples.len().max(1) as f64;
+        let count = count.max(1) as f64;
         let mean: Vec<f64> = sums.iter().map(|sum| sum / count).collect();
         let deviation = (squares.iter().zip(&mean))
             .map(|(square, mean)| (square / count - mean * mean).max(0.0).sqrt() + LEAST_DEVIATION)
             .collect();
         Self { mean, deviation }
+    }
+
+    /// Brings a row of inputs into these coordinates.
+    pub fn apply(&self, row: &mut [f32]) {
+        for ((value, mean), deviation) in row.iter_mut().zip(&self.mean).zip(&self.deviation) {
+            *value = ((f64::from(*value) - mean) / deviation) as f32;
+        }
     }
 
     /// The same network for raw inputs: with a batch normalisation before its layers.
@@ -98,12 +104,7 @@ impl Dataset for Standardised<'_> {
     fn fill(&self, samples: &[usize], batch: &mut Batch) {
         self.examples.fill(samples, batch);
         for i in 0..samples.len() {
-            let row = batch.inputs.row_mut(i).iter_mut();
-            for ((value, mean), deviation) in
-                row.zip(&self.standard.mean).zip(&self.standard.deviation)
-            {
-                *value = ((f64::from(*value) - mean) / deviation) as f32;
-            }
+            self.standard.apply(batch.inputs.row_mut(i));
         }
     }
 }

@@ -38,8 +38,8 @@ trait Plan: Send + Sync {
     /// Simulates and judges case `n`: its outcome and its truth.
     fn case(&self, n: u64) -> Result<(Self::Case, Value), Failure>;
 
-    /// Simulates case `n`: its recording and its truth.
-    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure>;
+    /// Simulates case `n`: its recording, unless it has none, and its truth.
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, Value), Failure>;
 
     /// The table of all cases.
     fn table(&self, cases: &[Self::Case]) -> String;
@@ -58,12 +58,16 @@ pub(crate) trait Shared: Send + Sync {
     /// The outcome of case `n` and its truth, each as JSON on one line.
     fn line(&self, n: u64) -> Result<[String; 2], Failure>;
 
-    /// The recording of case `n`, and its truth as JSON on one line.
-    fn recording(&self, n: u64) -> Result<(Columns, String), Failure>;
+    /// The recording of case `n`, unless it has none, and its truth as JSON on one line.
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, String), Failure>;
 
-    /// The table of these outcomes, which are in the order of their numbers; with the settings of the campaign, the JSON
+    /// The table of the outcomes of all cases, in the order of their numbers; with the settings of the campaign, the JSON
     /// report.
-    fn text(&self, settings: Option<&Value>, lines: &[String]) -> Result<String, Failure>;
+    fn text(
+        &self,
+        settings: Option<&Value>,
+        lines: &mut dyn Iterator<Item = String>,
+    ) -> Result<String, Failure>;
 
     /// Computes all cases in the threads of this machine.
     fn run(&self, arguments: &args::Campaign) -> Result<Table, Failure>;
@@ -80,14 +84,22 @@ impl<P: Plan> Shared for P {
         Ok([case, truth.to_string()])
     }
 
-    fn recording(&self, n: u64) -> Result<(Columns, String), Failure> {
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, String), Failure> {
         let (columns, truth) = Plan::recording(self, n)?;
         Ok((columns, truth.to_string()))
     }
 
-    fn text(&self, settings: Option<&Value>, lines: &[String]) -> Result<String, Failure> {
-        let cases = lines.iter().map(|line| serde_json::from_str(line));
+    fn text(
+        &self,
+        settings: Option<&Value>,
+        lines: &mut dyn Iterator<Item = String>,
+    ) -> Result<String, Failure> {
+        let cases = lines.map(|line| serde_json::from_str(&line));
         let cases: Vec<P::Case> = cases.collect::<Result<_, _>>().map_err(Failure::usage)?;
+        let (found, count) = (cases.len() as u64, Plan::count(self));
+        if found != count {
+            return Err(Failure::usage(format!("{found} outcomes of {count} cases")));
+        }
         Ok(printed(self, settings, &cases))
     }
 
@@ -233,10 +245,10 @@ impl Plan for Relay {
         Ok((outcome.into(), truth_of_relay_test(&experiment)))
     }
 
-    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, Value), Failure> {
         let experiment = experiment(&self.0, n)?;
         let columns = recorded(&experiment, RELAY_PERIODS)?;
-        Ok((columns, truth_of_relay_test(&experiment)))
+        Ok((Some(columns), truth_of_relay_test(&experiment)))
     }
 
     fn table(&self, cases: &[RelayCase]) -> String {
@@ -261,10 +273,10 @@ impl Plan for Identification {
         Ok((case, truth_of_relay_test(&experiment)))
     }
 
-    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, Value), Failure> {
         let experiment = experiment(&self.0, n)?;
         let columns = recorded(&experiment, IDENTIFICATION_PERIODS)?;
-        Ok((columns, truth_of_relay_test(&experiment)))
+        Ok((Some(columns), truth_of_relay_test(&experiment)))
     }
 
     fn table(&self, cases: &[IdentificationCase]) -> String {
@@ -274,10 +286,6 @@ impl Plan for Identification {
 
 /// Cases of the family for one case of each kind out of it: false alarms are rare and count most.
 const IN_FAMILY: u64 = 5;
-
-fn without_recording(n: u64, reason: &str) -> Failure {
-    Failure::usage(format!("case {n} has no recording: its process {reason}"))
-}
 
 /// Processes in and out of the family.
 struct Unknown {
@@ -357,10 +365,10 @@ impl Plan for Unknown {
         Ok((judged.map(OutsiderCase::from), truth))
     }
 
-    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, Value), Failure> {
         let (experiment, truth) = self.experiment(n)?;
-        let experiment = experiment.ok_or_else(|| without_recording(n, "does not oscillate"))?;
-        Ok((recorded(&experiment, PERIODS)?, truth))
+        let recording = experiment.map(|experiment| recorded(&experiment, PERIODS));
+        Ok((recording.transpose()?, truth))
     }
 
     fn table(&self, cases: &[Option<OutsiderCase>]) -> String {
@@ -409,9 +417,10 @@ impl Plan for Recordings {
         Ok((recording_outcome(&recording, &self.0.options()), truth))
     }
 
-    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, Value), Failure> {
         let (recording, truth) = self.record(n)?;
-        Ok((columns(recording.trace, recording.sample_s), truth))
+        let columns = columns(recording.trace, recording.sample_s);
+        Ok((Some(columns), truth))
     }
 
     fn table(&self, cases: &[RecordingOutcome]) -> String {
@@ -456,10 +465,9 @@ impl Plan for WrongData {
         Ok((honesty_outcome(recording.as_ref()), truth))
     }
 
-    fn recording(&self, n: u64) -> Result<(Columns, Value), Failure> {
+    fn recording(&self, n: u64) -> Result<(Option<Columns>, Value), Failure> {
         let (recording, truth) = self.record(n)?;
-        let recording = recording.ok_or_else(|| without_recording(n, "runs away"))?;
-        Ok((recording.columns, truth))
+        Ok((recording.map(|recording| recording.columns), truth))
     }
 
     fn table(&self, cases: &[HonestyOutcome]) -> String {

@@ -144,11 +144,8 @@ impl<'a> Lesson<'a> {
         workers: &'a Workers,
     ) -> Result<Self, ClassifierError> {
         let classes = recipe.classes(workers)?;
-        let training = recipe.training(&classes, workers)?;
-        let mut sets = vec![recipe.verification(&classes, workers)?];
-        for test in &recipe.tests {
-            sets.push(recipe.test(test, &classes, workers)?);
-        }
+        let mut sets = recipe.all_sets(&classes, workers)?;
+        let training = sets.remove(0);
         workers.finish();
         Ok(Self {
             recipe,
