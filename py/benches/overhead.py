@@ -156,25 +156,30 @@ def pretended(rows, seconds):
     return seconds, rows
 
 
-def of_thousand(threads=1000, processes=8):
-    """What scheduler and client do with many workers: threads that sleep instead of computing, and outcomes of real cases."""
-    campaign = relay_campaign(1000)
-    rows = campaign.cases(0, 1000)
-    rate = 1000 / alone(1000)[0]
+def of_thousand(threads=1000, processes=8, case_s=0.1):
+    """What the client, of which there is one, does for many workers; and a check with threads that sleep instead of computing cases of
+    `case_s`, with outcomes of real ones."""
+    some = relay_campaign(1000).cases(0, 1000)
+    with tempfile.TemporaryDirectory() as out:
+        folder = _cluster._Folder(out, "client")
+        folder.add(0, some)
+        begin = time.perf_counter()
+        folder.add(1000, 10 * some)
+        a_case_s = (time.perf_counter() - begin) / 10_000
+    print(f"the client needs {1e6 * a_case_s:.0f} us for a case: it keeps up with 1,000 workers if a case takes {1e6 * a_case_s:.0f} ms, and "
+          f"with {0.003 / a_case_s:.0f} if it takes 3 ms")
+    seconds = _cluster.task_s(threads)
+    cases, count = int(seconds / case_s), 2 * threads
+    rows = some[:cases]
+    left = iter(range(count))
     with LocalCluster(n_workers=processes, threads_per_worker=threads // processes, dashboard_address=None) as cluster:
         with Client(cluster) as client, tempfile.TemporaryDirectory() as out:
-            seconds = _cluster.task_s(threads)
-            cases = int(rate * seconds)
-            rows = (rows * (1 + cases // len(rows)))[:cases]
-            count = 4 * threads
-            left = iter(range(count))
             folder = _cluster._Folder(out, "thousand")
-            client.scatter(rows, broadcast=True)
             begin = time.perf_counter()
             _cluster._spread(client, lambda _: next(left, None), lambda n: (pretended, rows, seconds),
                              lambda n, made: folder.add(n * cases, made[1]))
             took_s = time.perf_counter() - begin
-    print(f"{threads} threads of {processes} processes that sleep {seconds:.0f} s in {count} tasks of {cases} cases: {took_s:.0f} s, "
+    print(f"{threads} threads of {processes} processes, {count} tasks of {seconds:.0f} s with {cases} cases: {took_s:.0f} s, "
           f"{100 * (1 - count * seconds / threads / took_s):.1f} % idle, {count * cases / took_s:.0f} cases a second")
 
 
