@@ -106,7 +106,7 @@ def campaign(
     """Runs a campaign (a TOML file) on Dask and returns its outcomes.
 
     `client` is a `distributed.Client`; without one, workers are started on this machine. A task is `shard` cases, or some seconds
-    of work. In the folder `out` every task leaves a Parquet file, together one table at any time, and cases found there are not
+    of work. In the folder `out` every task leaves a Parquet file, together one table while it grows, and cases found there are not
     computed again: the same call resumes, one with more `cases` extends. `progress(done, count)` is called after each task.
 
     `measure(recording, truth)` is called for every case instead of the measure of the file, and returns its outcome: a number or a
