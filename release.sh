@@ -2,8 +2,7 @@
 # Builds what is published, into dist/:
 #   studio.html                     the studio: one page, for any browser
 #   onecycle-VERSION-linux-MACHINE  the program with the studio inside, static where the musl target can be had
-#   onecycle-VERSION-*.whl          the Python package with the program inside, for Python 3.10 and later on systems with glibc 2.17, of 2014,
-#   onecycle_lab-VERSION-*.whl      or later, and the one of the research; for x86-64 and aarch64 where their targets can be had
+#   onecycle-VERSION-*.whl          the Python package with the program inside, for Python 3.10 and later (maturin from the registry)
 #   onecycle-c-VERSION-MACHINE.tar.gz  library and header for firmware and programs in C
 #   onecycle-VERSION.pack           the trained identifier, for boards and for --pack
 #   onecycle-VERSION.cdx.json       what the program is made of (SBOM): every crate with version, licence and checksum, in CycloneDX
@@ -75,36 +74,15 @@ cp "$target/$triple/release/onecycle" "$program"
 strip "$program"
 "$program" identify examples/simulated_hover.csv >/dev/null
 
-echo "== Python packages"
+echo "== Python package"
 python3 -m venv "$target/release-venv"
 python=$target/release-venv/bin/python
-# Zig's linker knows the symbols of an old glibc, and other machines.
-"$python" -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2' 'ziglang==0.15.2' 'cargo-zigbuild==0.24.1'
-
-wheels() { # MACHINE
-    local triple=$1-unknown-linux-gnu build
-    export CARGO_TARGET_DIR=$target PYTHON=$python
-    build=(cargo zigbuild --release --locked --target "$triple.2.17")
-    "${build[@]}" -p onecycle-cli --features studio
-    (cd research && "${build[@]}" --bin onecycle-lab)
-    for package in "py onecycle" "research/py onecycle-lab"; do
-        read -r folder program <<<"$package"
-        py/wheel.sh "$folder" "$target/$triple/release/$program" dist --release --locked --zig --target "$triple" --compatibility manylinux2014
-    done
-}
-for other in x86_64 aarch64; do
-    if has_target "$other-unknown-linux-gnu"; then
-        (PATH=$target/release-venv/bin:$PATH && wheels "$other")
-    else
-        echo "release.sh: no target of Rust for $other: no wheels for it" >&2
-    fi
-done
-if compgen -G "dist/*$machine.whl" >/dev/null; then
-    "$python" -m pip install --quiet --disable-pip-version-check --force-reinstall dist/*"$machine".whl
-    (cd / && "$python" -c 'import onecycle; onecycle.Model("foptd", k=2.0, t_body_s=1.5, tau_s=0.3)')
-    "$python" -m onecycle identify examples/simulated_hover.csv >/dev/null
-    "$python" -m onecycle_lab campaign experiments/relay.toml --cases 5 >/dev/null
-fi
+"$python" -m pip install --quiet --disable-pip-version-check 'maturin>=1.9,<2'
+cp "$program" "$target/onecycle"
+CARGO_TARGET_DIR=$target PYTHON=$python py/wheel.sh py "$target/onecycle" dist --release --locked
+"$python" -m pip install --quiet --disable-pip-version-check --force-reinstall dist/*.whl
+(cd / && "$python" -c 'import onecycle; onecycle.Model("foptd", k=2.0, t_body_s=1.5, tau_s=0.3)')
+"$python" -m onecycle identify examples/simulated_hover.csv >/dev/null
 
 echo "== C library"
 cargo build --release --locked --manifest-path onboard/c/Cargo.toml --target-dir "$target"

@@ -350,7 +350,7 @@ if found.model is not None and found.controller is not None:
     margin: float | None = onecycle.margins(found.model, found.controller).phase_margin_rad
 draws: float = float(np.mean(found.posterior["k"])) + found.params["k"] + found.resid.sum()
 reports: list[onecycle.Report] = onecycle.identify_many([onecycle.Recording([0], [1], [2])], n_jobs=2, style="calm")
-ends: float = found.conf_int(0.5).loc["k", "low"] + (onecycle.expect(found.model, noise="1%")["k"].low or 0.0)
+ends: float = found.conf_int(0.5).loc["k", "low"] + (onecycle.expect(onecycle.Model("foptd", k=1.0), noise="1%")["k"].low or 0.0)
 kp: float = onecycle.design(onecycle.Model("foptd", k=1.0, t_body_s=2.0, tau_s=0.1), controller="pi").controller.kp
 '''
 WRONG = {

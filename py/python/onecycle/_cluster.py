@@ -73,7 +73,7 @@ def build() -> Build:
     """The version of the package, the kind of machine, and the hash of the compiled code of both packages."""
     code = hashlib.sha256()
     for module in (_onecycle, _lab._lab):
-        code.update(Path(module.__file__).read_bytes())
+        code.update(Path(str(module.__file__)).read_bytes())
     return _onecycle.__version__, f"{platform.system()} {platform.machine()}", code.hexdigest()
 
 
@@ -99,7 +99,7 @@ def checked(of_client: Build, task: Callable[..., Any], *words: Any) -> Any:
     """`task(*words)`, if this worker has the build of the client. Runs on a worker."""
     import distributed
 
-    at = str(distributed.get_worker().address)  # type: ignore[no-untyped-call]
+    at = str(distributed.get_worker().address)
     sentence = _difference(of_client, build(), at)
     return _Refused(at, sentence) if sentence else task(*words)
 

@@ -66,10 +66,12 @@ def _of_objects(array: NDArray[np.object_]) -> NDArray[Any]:
             # In UTC: with one zone, Python takes the difference of what the clocks on the wall show.
             if any((value.tzinfo is None) != (first.tzinfo is None) for value in array):
                 raise ValueError
-            array = np.array([value if value.tzinfo is None else value.astimezone(timezone.utc) for value in array], dtype=object)
-            array = array - array[0]
+            stamps = [value if value.tzinfo is None else value.astimezone(timezone.utc) for value in array]
+            durations = [stamp - stamps[0] for stamp in stamps]
+        else:
+            durations = list(array)
         # Those of pandas have nanoseconds.
-        return np.array([_nanoseconds(value) for value in array], dtype=object).astype(np.int64).astype("timedelta64[ns]")
+        return np.array([_nanoseconds(value) for value in durations], dtype=object).astype(np.int64).astype("timedelta64[ns]")
     except (AttributeError, OverflowError, TypeError, ValueError):
         raise _refused("`t` mixes kinds of time: give dates with a zone, dates without, or durations") from None
 

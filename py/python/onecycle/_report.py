@@ -241,7 +241,7 @@ class Report(_Shown):
         try:
             import pandas
         except ImportError:
-            return found  # type: ignore[return-value]
+            return found
         return pandas.DataFrame.from_dict(found, orient="index", columns=["low", "high"])
 
     def _ends(self, key: str, of: Interval, level: float) -> tuple[float, float]:
