@@ -397,6 +397,21 @@ fn value(report: &impl serde::Serialize) -> Result<Value, String> {
     serde_json::to_value(report).map_err(|error| error.to_string())
 }
 
+/// Labels of the settings that have a field on the page.
+const FIELDS: [(&str, &str); 11] = [
+    ("axis", "Loop"),
+    ("details", "Process and remarks"),
+    ("from", "From"),
+    ("input_range", "Range of its output"),
+    ("loop", "Loop"),
+    ("output_range", "Range of its measurement"),
+    ("structure", "Structure"),
+    ("style", "Style"),
+    ("to", "To"),
+    ("vendor", "Gains for"),
+    ("write", "Save half step"),
+];
+
 /// A setting as the page has it: one of its fields, or what one types among the further options.
 fn field(of: Named<'_>) -> String {
     let (name, value) = match of {
@@ -405,20 +420,29 @@ fn field(of: Named<'_>) -> String {
         Named::Log(_) => return "“Loop”".to_owned(),
         _ => return String::new(),
     };
-    let label = match name {
-        "axis" | "loop" => "Loop",
-        "details" => "Process and remarks",
-        "from" => "From",
-        "input_range" => "Range of its output",
-        "output_range" => "Range of its measurement",
-        "structure" => "Structure",
-        "style" => "Style",
-        "to" => "To",
-        "vendor" => "Gains for",
-        "write" => "Save half step",
-        _ => return format!("“Further options”: {}", words::option(of)),
+    let Some((_, label)) = FIELDS.iter().find(|(field, _)| *field == name) else {
+        return format!("“Further options”: {}", words::option(of));
     };
     value.map_or(format!("“{label}”"), |value| {
         format!("“{label}”: {value}")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_has_every_label() {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../web/page/page.html");
+        let page = std::fs::read_to_string(page).unwrap();
+        for label in FIELDS
+            .map(|(_, label)| label)
+            .iter()
+            .chain(&["Further options"])
+        {
+            let starts = [">", " "].map(|before| format!("{before}{label}"));
+            assert!(starts.iter().any(|start| page.contains(start)), "{label}");
+        }
+    }
 }

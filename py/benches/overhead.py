@@ -15,7 +15,7 @@ from distributed import Client, LocalCluster, get_task_stream
 
 import onecycle
 import onecycle_lab
-from onecycle import _cluster
+from onecycle import _cluster, _table
 
 ROOT = Path(__file__).parents[2]
 
@@ -150,10 +150,10 @@ def of_dask(cases=10_000):
               f"{size:.0f} bytes an outcome", flush=True)
 
 
-def pretended(rows, seconds):
-    """A task that takes its time and no processor."""
+def pretended(row, cases, seconds):
+    """A task that takes its time and hardly any processor, and outcomes that travel like real ones: each a text of its own."""
     time.sleep(seconds)
-    return seconds, rows
+    return seconds, [[text[:1] + text[1:] for text in row] for _ in range(cases)]
 
 
 def of_thousand(threads=1000, processes=8, case_s=0.1):
@@ -161,7 +161,7 @@ def of_thousand(threads=1000, processes=8, case_s=0.1):
     `case_s`, with outcomes of real ones."""
     some = relay_campaign(1000).cases(0, 1000)
     with tempfile.TemporaryDirectory() as out:
-        folder = _cluster._Folder(out, "client")
+        folder = _table.Folder(out, "client")
         folder.add(0, some)
         begin = time.perf_counter()
         folder.add(1000, 10 * some)
@@ -170,13 +170,12 @@ def of_thousand(threads=1000, processes=8, case_s=0.1):
           f"with {0.003 / a_case_s:.0f} if it takes 3 ms")
     seconds = _cluster.task_s(threads)
     cases, count = int(seconds / case_s), 2 * threads
-    rows = some[:cases]
     left = iter(range(count))
     with LocalCluster(n_workers=processes, threads_per_worker=threads // processes, dashboard_address=None) as cluster:
         with Client(cluster) as client, tempfile.TemporaryDirectory() as out:
-            folder = _cluster._Folder(out, "thousand")
+            folder = _table.Folder(out, "thousand")
             begin = time.perf_counter()
-            _cluster._spread(client, lambda _: next(left, None), lambda n: (pretended, rows, seconds),
+            _cluster._spread(client, lambda _: next(left, None), lambda n: (pretended, some[0], cases, seconds),
                              lambda n, made: folder.add(n * cases, made[1]))
             took_s = time.perf_counter() - begin
     print(f"{threads} threads of {processes} processes, {count} tasks of {seconds:.0f} s with {cases} cases: {took_s:.0f} s, "

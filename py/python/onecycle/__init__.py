@@ -121,7 +121,8 @@ def campaign(
     try:
         return run(recipe, client, out, shard, progress, tuple(words), measure)
     except OnecycleError as error:
-        raise OnecycleError(as_keywords(str(error))) from error
+        error.args = (as_keywords(str(error)),)
+        raise
 
 
 def dataset(

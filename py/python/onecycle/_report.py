@@ -30,10 +30,12 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 
-def _arrays(columns: list[tuple[str, NDArray[np.float64]]]) -> Arrays:
-    for _, values in columns:
-        values.flags.writeable = False
-    return MappingProxyType(dict(columns))
+def _read_only(values: dict[str, T]) -> Mapping[str, T]:
+    """A dict that nobody changes, nor its arrays."""
+    for value in values.values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    return MappingProxyType(values)
 
 
 def bare(source: Any) -> Any:
@@ -120,14 +122,8 @@ class _Shown:
         return {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in kept.items()}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        # Everything that is a dict is shown read-only; arrays forget in a pickle that they are.
-        for name, value in state.items():
-            if isinstance(value, dict):
-                for array in value.values():
-                    if isinstance(array, np.ndarray):
-                        array.flags.writeable = False
-                value = MappingProxyType(value)
-            self.__dict__[name] = value
+        # Dicts and arrays forget in a pickle that they are read-only.
+        self.__dict__.update({name: _read_only(value) if isinstance(value, dict) else value for name, value in state.items()})
 
 
 @dataclass(frozen=True)
@@ -257,7 +253,7 @@ class Report(_Shown):
     @cached_property
     def posterior(self) -> Arrays:
         """4,000 draws of every parameter, by key: those of one place in the arrays belong together."""
-        return _arrays(self._inner.posterior())
+        return _read_only(dict(self._inner.posterior()))
 
     def to_xarray(self) -> xarray.Dataset:
         """The draws as a Dataset over `chain` (one) and `draw`, which arviz takes: `arviz.summary(report.to_xarray())`."""
@@ -298,7 +294,7 @@ class Report(_Shown):
         """The fit row by row, as arrays of equal length: `time_s`, `measured` (NaN where absent), `simulated` (without disturbances),
         and of a fit to the whole recording `predicted` (from the rows before), `innovation` (error of the prediction over its
         deviation) and `disturbance` (at the input). Empty without a fit in time."""
-        return _arrays(self._inner.rows())
+        return _read_only(dict(self._inner.rows()))
 
     @property
     def fittedvalues(self) -> NDArray[np.float64]:

@@ -16,7 +16,8 @@ use serde_json::Value;
 use crate::args::{Arguments, Command};
 use crate::commands::campaign::{self, plan};
 use crate::commands::dataset;
-use crate::commands::dataset::classifier::{self, Rows, Sets};
+pub use crate::commands::dataset::classifier::Rows;
+use crate::commands::dataset::classifier::{self, Sets};
 use crate::commands::dataset::folder::Folder;
 
 /// A campaign, whose cases depend on the file, the options and their number only: they can be computed anywhere and in any
@@ -150,9 +151,6 @@ impl Dataset {
     }
 }
 
-/// Examples of the paper's classifier: their inputs, as they were measured, their classes, and the costs of all classes.
-pub type Examples = (Vec<f32>, Vec<u64>, Vec<f32>);
-
 /// The sets of a recipe of the paper's classifier, whose parts are made by others.
 pub struct ClassifierSets(Sets);
 
@@ -185,7 +183,7 @@ impl ClassifierSets {
     ///
     /// # Errors
     /// One sentence: there are no such experiments, or one cannot be made.
-    pub fn part(&self, set: usize, numbers: Range<u64>) -> Result<Examples, String> {
+    pub fn part(&self, set: usize, numbers: Range<u64>) -> Result<Rows, String> {
         let sizes = self.sizes();
         let is_there =
             |(_, size): &(String, u64)| numbers.start <= numbers.end && numbers.end <= *size;
@@ -193,21 +191,14 @@ impl ClassifierSets {
             return Err(format!("there are no experiments {numbers:?} of set {set}"));
         }
         let made = self.0.part(set, numbers, &OneThread);
-        let made = made.map_err(|failure| failure.to_string())?;
-        Ok((made.inputs, made.labels, made.costs))
+        made.map_err(|failure| failure.to_string())
     }
 
     /// Writes the files of `onecycle-lab dataset` from the examples of every set.
     ///
     /// # Errors
     /// One sentence: a file cannot be written.
-    pub fn write(&self, into: &str, sets: Vec<Examples>) -> Result<(), String> {
-        let rows = |(inputs, labels, costs)| Rows {
-            inputs,
-            labels,
-            costs,
-        };
-        let sets = sets.into_iter().map(rows).collect();
+    pub fn write(&self, into: &str, sets: Vec<Rows>) -> Result<(), String> {
         let written = self.0.write(Path::new(into), sets);
         written.map(|_| ()).map_err(|failure| failure.to_string())
     }

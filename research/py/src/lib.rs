@@ -141,18 +141,22 @@ impl ClassifierSets {
     fn part<'py>(&self, py: Python<'py>, set: usize, first: u64, end: u64) -> PyResult<Rows<'py>> {
         let sets = Arc::clone(&self.0);
         let made = waited(py, move || sets.part(set, first..end))?;
-        let (inputs, labels, costs) = made.map_err(refused)?;
+        let rows = made.map_err(refused)?;
         Ok((
-            inputs.into_pyarray(py),
-            labels.into_pyarray(py),
-            costs.into_pyarray(py),
+            rows.inputs.into_pyarray(py),
+            rows.labels.into_pyarray(py),
+            rows.costs.into_pyarray(py),
         ))
     }
 
     /// Writes the files of all sets.
     fn write(&self, py: Python<'_>, into: String, sets: Vec<Rows<'_>>) -> PyResult<()> {
         let sets = sets.iter().map(|(inputs, labels, costs)| {
-            Ok((inputs.to_vec()?, labels.to_vec()?, costs.to_vec()?))
+            Ok(lab::Rows {
+                inputs: inputs.to_vec()?,
+                labels: labels.to_vec()?,
+                costs: costs.to_vec()?,
+            })
         });
         let sets = sets.collect::<PyResult<Vec<_>>>()?;
         let all = Arc::clone(&self.0);

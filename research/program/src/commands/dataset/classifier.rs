@@ -17,7 +17,7 @@ use onecycle_cli::report::json::to_text;
 use onecycle_lab::learn::npz::{self, Column, Numbers};
 use onecycle_lab::learn::train::Dataset;
 use onecycle_lab::paper::classifier::{Classes, ClassifierRecipe};
-use onecycle_lab::workers::Workers as Any;
+use onecycle_lab::workers;
 
 use crate::args;
 use crate::output::{print, write_file, write_text};
@@ -37,16 +37,19 @@ pub(crate) struct Sets {
     classes: Classes,
 }
 
-/// Examples, their inputs as they were measured.
+/// Examples of the paper's classifier, one after the other.
 #[derive(Default)]
-pub(crate) struct Rows {
-    pub(crate) inputs: Vec<f32>,
-    pub(crate) labels: Vec<u64>,
-    pub(crate) costs: Vec<f32>,
+pub struct Rows {
+    /// Inputs as they were measured.
+    pub inputs: Vec<f32>,
+    /// True classes.
+    pub labels: Vec<u64>,
+    /// Costs of all classes.
+    pub costs: Vec<f32>,
 }
 
 impl Sets {
-    pub(crate) fn read(path: &Path, workers: &dyn Any) -> Result<Self, Failure> {
+    pub(crate) fn read(path: &Path, workers: &dyn workers::Workers) -> Result<Self, Failure> {
         let recipe: ClassifierRecipe = settings::read(path)?;
         let failed = |error| Failure::unreadable(path, error);
         recipe.validate().map_err(failed)?;
@@ -69,7 +72,7 @@ impl Sets {
         &self,
         set: usize,
         numbers: Range<u64>,
-        workers: &dyn Any,
+        workers: &dyn workers::Workers,
     ) -> Result<Rows, Failure> {
         let examples = self.recipe.part(set, numbers, &self.classes, workers);
         let examples = examples.map_err(|error| Failure::unreadable(&self.path, error))?;
