@@ -5,10 +5,11 @@
 
 A heater above its ambient temperature is K e^(-tau s)/((T1 s + 1)(T2 s + 1)). Each parameter is drawn within 20 % of its value.
 Tests: a relay between 0 and full power with hysteresis, and a step to half power after 0 to 30 rows of rest. Logs: every
-decision of the relay, and a value a second (room: 20 s) rounded to 0.1 degree.
+decision of the relay, a value a second (room: 20 s) rounded to 0.1 degree, and what a display shows: rounded to 1 degree (room: 0.25).
 
-An answer is right if the process comes to rest by itself, K is within 10 %, and tau within 5 % or one row. Counted beside: how
-often the 90 % intervals of K and tau hold both. Prints a row for each test, log and heater.
+An answer is right if the process comes to rest by itself, K is within 10 %, and tau within 5 % or one row. A display does not
+tell a dead time from a short lag: there tau with the shorter lags is within 20 % or one row of tau + T2. Counted beside: how often
+the 90 % intervals of K and tau hold both. Prints a row for each test, log and heater.
 """
 
 import argparse
@@ -51,7 +52,7 @@ def relay(name, chance):
         power = late[-1 - steps]
         slow += (1 - math.exp(-dt / t1)) * (power - slow)
         fast += (1 - math.exp(-dt / t2)) * (power - fast)
-    return rows, (k, tau)
+    return rows, (k, tau, t2)
 
 
 def step(name, chance):
@@ -66,22 +67,22 @@ def step(name, chance):
         response = 1 - (t1 * math.exp(-since / t1) - t2 * math.exp(-since / t2)) / (t1 - t2)
         value = ambient + 0.5 * k * response + chance.gauss(0, NOISE.get(name, 0.05))
         rows.append((index * dt, 0.5 if index * dt >= at else 0.0, value))
-    return rows, (k, tau)
+    return rows, (k, tau, t2)
 
 
-def coarse(rows, name):
-    """The last row before each second (room: 20 s), rounded to 0.1 degree."""
+def coarse(rows, name, steps):
+    """The last row before each second (room: 20 s), rounded to that many steps a degree."""
     period = 20.0 if name == "room" else 1.0
     kept, due = [], 0.0
     for time, power, value in rows:
         if time >= due - 1e-9:
-            kept.append((time, power, round(value, 1)))
+            kept.append((time, power, round(value * steps) / steps))
             due += period
     return kept
 
 
-def judge(program, rows, truth):
-    k, tau = truth
+def judge(program, rows, truth, is_displayed):
+    k, tau, t2 = truth
     with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
         file.write("time_s,input,output\n")
         file.writelines("%.7g,%.7g,%.7g\n" % row for row in rows)
@@ -93,12 +94,13 @@ def judge(program, rows, truth):
     gain, delay = process.get("k") or {}, process["tau_s"]
     row_s = rows[1][0] - rows[0][0]
     estimate = gain.get("estimate")
-    right = (
-        process["structure"] in SELF_REGULATING
-        and estimate is not None
-        and abs(estimate / k - 1) < 0.1
-        and abs(delay["estimate"] - tau) < max(0.05 * tau, row_s)
-    )
+    if is_displayed:
+        lags = sum((process.get(name) or {}).get("estimate") or 0 for name in ("t_prop_s", "t_prop2_s"))
+        is_timed = abs(delay["estimate"] + lags - tau - t2) < max(0.2 * (tau + t2), row_s)
+    else:
+        is_timed = abs(delay["estimate"] - tau) < max(0.05 * tau, row_s)
+    is_gain = estimate is not None and abs(estimate / k - 1) < 0.1
+    right = process["structure"] in SELF_REGULATING and is_gain and is_timed
     holds = all(
         interval.get("low") is not None and interval.get("high") is not None
         and interval["low"] <= value <= interval["high"]
@@ -115,14 +117,16 @@ def main():
     total = [0, 0, 0, 0]
     print("| test, log | heater | runs | answered | right | K and tau held |\n| --- | --- | --- | --- | --- | --- |")
     for test in (relay, step):
-        for log in ("every row", "coarse"):
+        for log in ("every row", "coarse", "display"):
             for name in HEATERS:
                 counts = [0, 0, 0]
                 for run in range(asked.runs):
                     chance = random.Random(f"{test.__name__} {name} {run}")
                     rows, truth = test(name, chance)
-                    rows = coarse(rows, name) if log == "coarse" else rows
-                    counts = [a + b for a, b in zip(counts, judge(asked.program, rows, truth))]
+                    if log != "every row":
+                        rows = coarse(rows, name, 10 if log == "coarse" else 4 if name == "room" else 1)
+                    judged = judge(asked.program, rows, truth, log == "display")
+                    counts = [a + b for a, b in zip(counts, judged)]
                 total = [a + b for a, b in zip(total, [asked.runs, *counts])]
                 print(f"| {test.__name__}, {log} | {name} | {asked.runs} | " + " | ".join(map(str, counts)) + " |", flush=True)
     print(f"| all | | {total[0]} | {total[1]} | {total[2]} | {total[3]} |")

@@ -8,7 +8,7 @@ use super::orthogonal::Orthogonal;
 use super::record::{Forces, Hold, Record};
 use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
-use crate::signals::{Signals, is_constant};
+use crate::signals::{Signals, is_constant, smallest_step};
 use crate::verdict::Verdict;
 
 /// Fewest samples to fit.
@@ -81,7 +81,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
     record.rest = rest;
-    record.floor = FLOOR * movement(&record);
+    record.floor = (FLOOR * movement(&record)).max(rounding(&record));
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -105,6 +105,14 @@ fn movement(record: &Record) -> f64 {
     };
     let sum: f64 = outputs.chunks(count).map(squares).sum();
     (sum / outputs.len().max(1) as f64).sqrt()
+}
+
+/// Standard deviation to which a sample is believed beside its rounding (output unit): that of a rounding error, uniform over one step,
+/// times the root of the number of samples that share a level on average, and with it their error. They tell as little as one.
+fn rounding(record: &Record) -> f64 {
+    let outputs: Vec<f64> = record.present_outputs().collect();
+    let levels = outputs.chunk_by(|a, b| a == b).count();
+    smallest_step(&outputs) * (outputs.len() as f64 / levels as f64 / 12.0).sqrt()
 }
 
 /// The longest run of indices of `asked` between gaps.
@@ -279,12 +287,24 @@ fn mark_stale(record: &mut Record) {
     values.dedup();
     let others = (present.len() - stale.len()) as f64;
     let is_distinct = values.len() as f64 >= ALIKE * others;
-    if !(is_distinct || is_regular(record, &present)) {
+    if is_staircase(record) || !(is_distinct || is_regular(record, &present)) {
         return;
     }
     for index in stale {
         record.present[index] = false;
     }
+}
+
+/// Whether most changes of the output are of its smallest step: then what repeats is rounded, and not stale.
+fn is_staircase(record: &Record) -> bool {
+    let outputs: Vec<f64> = record.present_outputs().collect();
+    let step = smallest_step(&outputs);
+    let changes = outputs.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let (all, small) = (changes.filter(|change| *change > 0.0))
+        .fold((0, 0), |(all, small), change| {
+            (all + 1, small + usize::from(change < 1.5 * step))
+        });
+    2 * small > all
 }
 
 /// Whether most runs of equal outputs have one length, or a multiple of it, above one sample.
@@ -362,6 +382,29 @@ mod tests {
                 .iter()
                 .all(|p| *p)
         );
+    }
+
+    // A temperature that rises by 1 degree every few samples never shows one twice.
+    #[test]
+    fn a_staircase_is_not_stale() {
+        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
+        let rising: Vec<f64> = (0..300).map(|k| f64::from(k / 4)).collect();
+        let found = prepared(&times_s, &rising, &[]).record;
+        assert!(found.present.iter().all(|present| *present));
+        let slow: Vec<f64> = rising.iter().map(|k| (0.37 * k).sin()).collect();
+        let stale = prepared(&times_s, &slow, &[]).record;
+        assert_eq!(stale.present_outputs().count(), 75);
+    }
+
+    // Steps of 1, with three samples on each: sqrt(3/12); with one: sqrt(1/12).
+    #[test]
+    fn samples_that_share_a_level_share_its_rounding_error() {
+        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
+        let staircase: Vec<f64> = (0..300).map(|k| f64::from(k / 3)).collect();
+        let floor = |output: &[f64]| rounding(&gridded(&times_s, &ramp(300), output, &[true; 300]));
+        assert!((floor(&staircase) - 0.5).abs() < 1e-12);
+        let rising: Vec<f64> = (0..300).map(f64::from).collect();
+        assert!((floor(&rising) - 1.0 / 12_f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]
