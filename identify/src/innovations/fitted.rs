@@ -229,7 +229,8 @@ impl Fitted {
         let record = &self.record;
         let (low, high) = range(&record.input);
         RecordedLoop {
-            sigma: self.best.found.at.seen_deviation(),
+            // A controller sees the steps of a display.
+            sigma: (self.best.found.at.seen_deviation()).max(record.rounding),
             output_size: record.output_deviation(),
             input_amplitude: 0.5 * (high - low),
             sample_s: record.dt_s,

@@ -39,6 +39,7 @@ pub fn expected(
     let mut record = Record {
         forces: Forces::default(),
         floor: 0.0,
+        rounding: 0.0,
         uneven_s: vec![],
         dt_s: sample_s,
         input: input.to_vec(),

@@ -81,7 +81,10 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
     record.rest = rest;
-    record.floor = (FLOOR * movement(&record)).max(rounding(&record));
+    let (rounding, shared) = rounding(&record);
+    record.floor = (FLOOR * movement(&record)).max(shared);
+    // Of an output that repeats more often than it changes.
+    record.rounding = if shared > rounding { rounding } else { 0.0 };
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -107,12 +110,15 @@ fn movement(record: &Record) -> f64 {
     (sum / outputs.len().max(1) as f64).sqrt()
 }
 
-/// Standard deviation to which a sample is believed beside its rounding (output unit): that of a rounding error, uniform over one step,
-/// times the root of the number of samples that share a level on average, and with it their error. They tell as little as one.
-fn rounding(record: &Record) -> f64 {
+/// Standard deviation of the rounding error of a sample, uniform over one step (output unit), and that to which a sample is believed
+/// beside it: times the root of the number of other samples that share its level on average, and with it its error. The error
+/// of an output that never repeats is white, and the fit sees it.
+fn rounding(record: &Record) -> (f64, f64) {
     let outputs: Vec<f64> = record.present_outputs().collect();
     let levels = outputs.chunk_by(|a, b| a == b).count();
-    smallest_step(&outputs) * (outputs.len() as f64 / levels as f64 / 12.0).sqrt()
+    let deviation = smallest_step(&outputs) / 12_f64.sqrt();
+    let shared = (outputs.len() - levels) as f64 / levels as f64;
+    (deviation, deviation * shared.sqrt())
 }
 
 /// The longest run of indices of `asked` between gaps.
@@ -170,6 +176,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64], usable: &[bool]) -> R
         rest: None,
         forces: Forces::default(),
         floor: 0.0,
+        rounding: 0.0,
     };
     if is_even {
         return record;
@@ -251,6 +258,7 @@ fn spread(
         rest: None,
         forces: Forces::default(),
         floor: 0.0,
+        rounding: 0.0,
     };
     let mut sample = 0;
     for index in 0..count {
@@ -396,15 +404,15 @@ mod tests {
         assert_eq!(stale.present_outputs().count(), 75);
     }
 
-    // Steps of 1, with three samples on each: sqrt(3/12); with one: sqrt(1/12).
+    // Steps of 1, with three samples on each: sqrt(2/12); with one: none.
     #[test]
     fn samples_that_share_a_level_share_its_rounding_error() {
         let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
         let staircase: Vec<f64> = (0..300).map(|k| f64::from(k / 3)).collect();
         let floor = |output: &[f64]| rounding(&gridded(&times_s, &ramp(300), output, &[true; 300]));
-        assert!((floor(&staircase) - 0.5).abs() < 1e-12);
+        assert!((floor(&staircase).1 - (2_f64 / 12.0).sqrt()).abs() < 1e-12);
         let rising: Vec<f64> = (0..300).map(f64::from).collect();
-        assert!((floor(&rising) - 1.0 / 12_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(floor(&rising), (1.0 / 12_f64.sqrt(), 0.0));
     }
 
     #[test]
