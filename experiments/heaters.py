@@ -27,6 +27,8 @@ HEATERS = {
     "room": (15, 3600, 300, 120.0, 21, 0.5, 18, 6.0, 60000),
 }
 NOISE = {"room": 0.02}
+# Steps a degree that a display shows, if not one.
+DISPLAYED = {"room": 4}
 SELF_REGULATING = ("foptd", "soptd", "toptd", "resonant", "resonant_lag")
 
 
@@ -124,7 +126,7 @@ def main():
                     chance = random.Random(f"{test.__name__} {name} {run}")
                     rows, truth = test(name, chance)
                     if log != "every row":
-                        rows = coarse(rows, name, 10 if log == "coarse" else 4 if name == "room" else 1)
+                        rows = coarse(rows, name, 10 if log == "coarse" else DISPLAYED.get(name, 1))
                     judged = judge(asked.program, rows, truth, log == "display")
                     counts = [a + b for a, b in zip(counts, judged)]
                 total = [a + b for a, b in zip(total, [asked.runs, *counts])]

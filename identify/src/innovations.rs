@@ -381,7 +381,7 @@ impl Search<'_> {
         let model = result::model(&fitted.best.found, prepared.early_s);
         let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
         let filter = recorded_filter(prepared.filter, &model);
-        let recorded = fitted.recorded_loop(excited, filter);
+        let recorded = fitted.recorded_loop(excited, prepared.rounding, filter);
         let specification = recorded.complete(&self.options.specification);
         let checked = (tests, prediction, widened);
         let mut remarks = std::mem::take(&mut self.remarks);

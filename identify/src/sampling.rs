@@ -15,7 +15,7 @@
 //! Rounding to steps of `q` does: its error is white with the variance `q^2/12` where the output passes many steps, and
 //! repeats where it hardly moves. So that variance is added to the one of the smallest slopes.
 
-use crate::signals::{Signals, smallest_step};
+use crate::signals::{Signals, rounding_deviation};
 
 /// Half width of the difference that shows the slope, as a share of the period; in samples at least that of `D4`.
 const HALF_WIDTH: f64 = 1.0 / 14.0;
@@ -71,7 +71,7 @@ pub(crate) fn jitter(signals: &Signals<'_>, period_s: f64) -> Option<f64> {
     };
     let slope_sq = |part: &[(f64, f64)]| part.iter().map(|pair| pair.0 * pair.0).sum::<f64>();
     let (flat, steep) = (&pairs[..third], &pairs[pairs.len() - third..]);
-    let rounding = smallest_step(y).powi(2) / 12.0;
+    let rounding = rounding_deviation(y).powi(2);
     let (few, many) = (variance(flat) + rounding, variance(steep));
     let slopes = (slope_sq(steep) - slope_sq(flat)) / third as f64;
     let found = ((many - few) / slopes).max(0.0).sqrt();

@@ -33,6 +33,11 @@ pub(crate) fn smallest_step(output: &[f64]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
+/// Standard deviation of the rounding error of an output: uniform over its smallest step.
+pub(crate) fn rounding_deviation(output: &[f64]) -> f64 {
+    smallest_step(output) / 12_f64.sqrt()
+}
+
 /// Whether all values are equal.
 pub(crate) fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|value| *value == values[0])

@@ -220,17 +220,18 @@ impl Fitted {
         .collect()
     }
 
-    /// What the record says about the loop of a controller, with the known filter of its output.
+    /// What the record says about the loop of a controller, with the known rounding and filter of its output.
     pub(super) fn recorded_loop(
         &self,
         excited_rad_per_s: Option<f64>,
+        rounding: f64,
         filter: Option<LowPass>,
     ) -> RecordedLoop {
         let record = &self.record;
         let (low, high) = range(&record.input);
         RecordedLoop {
             // A controller sees the steps of a display.
-            sigma: (self.best.found.at.seen_deviation()).max(record.rounding),
+            sigma: self.best.found.at.seen_deviation().max(rounding),
             output_size: record.output_deviation(),
             input_amplitude: 0.5 * (high - low),
             sample_s: record.dt_s,

@@ -39,7 +39,6 @@ pub fn expected(
     let mut record = Record {
         forces: Forces::default(),
         floor: 0.0,
-        rounding: 0.0,
         uneven_s: vec![],
         dt_s: sample_s,
         input: input.to_vec(),

@@ -8,7 +8,7 @@ use super::orthogonal::Orthogonal;
 use super::record::{Forces, Hold, Record};
 use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
-use crate::signals::{Signals, is_constant, smallest_step};
+use crate::signals::{Signals, is_constant, rounding_deviation, smallest_step};
 use crate::verdict::Verdict;
 
 /// Fewest samples to fit.
@@ -44,6 +44,8 @@ pub(super) struct Prepared {
     pub(super) early_s: f64,
     /// Low-pass that was taken out of the output. `None`: none was.
     pub(super) filter: Option<LowPass>,
+    /// Standard deviation of the rounding of an output that repeats more often than it changes (output unit); zero for others.
+    pub(super) rounding: f64,
 }
 
 /// Record of the longest part of the recording without a gap, within the span of `options`.
@@ -81,10 +83,8 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
     record.rest = rest;
-    let (rounding, shared) = rounding(&record);
-    record.floor = (FLOOR * movement(&record)).max(shared);
-    // Of an output that repeats more often than it changes.
-    record.rounding = if shared > rounding { rounding } else { 0.0 };
+    let (rounding, sharing) = rounding(&record);
+    record.floor = (FLOOR * movement(&record)).max(rounding * sharing.sqrt());
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -95,6 +95,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
         filter: unfiltered
             .and(options.output_filter_hz)
             .map(LowPass::second_order),
+        rounding: if sharing > 1.0 { rounding } else { 0.0 },
     })
 }
 
@@ -110,15 +111,14 @@ fn movement(record: &Record) -> f64 {
     (sum / outputs.len().max(1) as f64).sqrt()
 }
 
-/// Standard deviation of the rounding error of a sample, uniform over one step (output unit), and that to which a sample is believed
-/// beside it: times the root of the number of other samples that share its level on average, and with it its error. The error
-/// of an output that never repeats is white, and the fit sees it.
+/// Standard deviation of the rounding error of a sample (output unit), and how many other samples share its level on average, and with it
+/// its error: beside them a sample is believed to the deviation times the root of their number. The error of an output that
+/// never repeats is white, and the fit sees it.
 fn rounding(record: &Record) -> (f64, f64) {
     let outputs: Vec<f64> = record.present_outputs().collect();
     let levels = outputs.chunk_by(|a, b| a == b).count();
-    let deviation = smallest_step(&outputs) / 12_f64.sqrt();
-    let shared = (outputs.len() - levels) as f64 / levels as f64;
-    (deviation, deviation * shared.sqrt())
+    let sharing = (outputs.len() - levels) as f64 / levels as f64;
+    (rounding_deviation(&outputs), sharing)
 }
 
 /// The longest run of indices of `asked` between gaps.
@@ -176,7 +176,6 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64], usable: &[bool]) -> R
         rest: None,
         forces: Forces::default(),
         floor: 0.0,
-        rounding: 0.0,
     };
     if is_even {
         return record;
@@ -258,7 +257,6 @@ fn spread(
         rest: None,
         forces: Forces::default(),
         floor: 0.0,
-        rounding: 0.0,
     };
     let mut sample = 0;
     for index in 0..count {
@@ -295,7 +293,8 @@ fn mark_stale(record: &mut Record) {
     values.dedup();
     let others = (present.len() - stale.len()) as f64;
     let is_distinct = values.len() as f64 >= ALIKE * others;
-    if is_staircase(record) || !(is_distinct || is_regular(record, &present)) {
+    let seems_stale = is_distinct || is_regular(record, &present);
+    if !seems_stale || is_staircase(record) {
         return;
     }
     for index in stale {
@@ -306,13 +305,12 @@ fn mark_stale(record: &mut Record) {
 /// Whether most changes of the output are of its smallest step: then what repeats is rounded, and not stale.
 fn is_staircase(record: &Record) -> bool {
     let outputs: Vec<f64> = record.present_outputs().collect();
-    let step = smallest_step(&outputs);
-    let changes = outputs.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let (all, small) = (changes.filter(|change| *change > 0.0))
-        .fold((0, 0), |(all, small), change| {
-            (all + 1, small + usize::from(change < 1.5 * step))
-        });
-    2 * small > all
+    // Two steps at once are the next larger change.
+    let one_step = 1.5 * smallest_step(&outputs);
+    let sizes = outputs.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let changes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
+    let small = changes.iter().filter(|size| **size < one_step);
+    2 * small.count() > changes.len()
 }
 
 /// Whether most runs of equal outputs have one length, or a multiple of it, above one sample.
@@ -409,7 +407,11 @@ mod tests {
     fn samples_that_share_a_level_share_its_rounding_error() {
         let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
         let staircase: Vec<f64> = (0..300).map(|k| f64::from(k / 3)).collect();
-        let floor = |output: &[f64]| rounding(&gridded(&times_s, &ramp(300), output, &[true; 300]));
+        let floor = |output: &[f64]| {
+            let record = gridded(&times_s, &ramp(300), output, &[true; 300]);
+            let (deviation, sharing) = rounding(&record);
+            (deviation, deviation * sharing.sqrt())
+        };
         assert!((floor(&staircase).1 - (2_f64 / 12.0).sqrt()).abs() < 1e-12);
         let rising: Vec<f64> = (0..300).map(f64::from).collect();
         assert_eq!(floor(&rising), (1.0 / 12_f64.sqrt(), 0.0));

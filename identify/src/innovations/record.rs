@@ -50,8 +50,6 @@ pub(crate) struct Record {
     /// Least deviation of the white noise of a sample that is believed (output unit): below it the digits of a file and the errors
     /// of any model decide. Zero: no limit.
     pub(crate) floor: f64,
-    /// Standard deviation of the rounding of a sample (output unit). Zero: the output hardly repeats.
-    pub(crate) rounding: f64,
 }
 
 /// Nonlinear forces that act on the process behind the actuator lags, together with the input and the disturbance. The
@@ -94,7 +92,6 @@ impl Record {
             rest: None,
             forces: Forces::default(),
             floor: 0.0,
-            rounding: 0.0,
         }
     }
 
@@ -188,7 +185,6 @@ impl Record {
                 thrust: self.forces.thrust,
             },
             floor: self.floor,
-            rounding: self.rounding,
         }
     }
 }

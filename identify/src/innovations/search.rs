@@ -102,7 +102,6 @@ pub(super) fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         rest: record.rest,
         forces: Forces::default(),
         floor: record.floor / (samples as f64).sqrt(),
-        rounding: record.rounding,
     };
     let length_s = record.time_s(record.len() - 1) + period_s;
     let steps = (length_s / dt_s + 1e-9) as usize;
