@@ -225,7 +225,7 @@ impl Search<'_> {
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
-        Self::judge_stability(blocks, tests, explained)?;
+        Self::judge_stability(blocks, fitted.best.found.theta.tau_s(), explained)?;
         let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
         let is_left = is_left_to_the_input(tests) && explained < 0.0;
         if is_left || is_another && explained < WELL_PREDICTED {
@@ -252,17 +252,12 @@ impl Search<'_> {
     }
 
     /// Refuses a process that is unstable without its controller: the reason why it is not predicted, or hardly. A random walk
-    /// may take what grows, and leaves clean innovations, but predicts worse than the mean.
-    fn judge_stability(
-        blocks: &Blocks<'_>,
-        tests: &InnovationTests,
-        explained: f64,
-    ) -> Result<(), Verdict> {
-        let is_clean = !validate::is_coloured(tests) && !is_left_to_the_input(tests);
-        if is_clean && explained >= 0.0 || !validate::is_fed_back(blocks) {
+    /// may take what grows, and leaves clean innovations.
+    fn judge_stability(blocks: &Blocks<'_>, tau_s: f64, explained: f64) -> Result<(), Verdict> {
+        if explained >= WELL_PREDICTED || !validate::is_fed_back(blocks) {
             return Ok(());
         }
-        match unstable::growth_per_s(blocks) {
+        match unstable::growth_per_s(blocks, tau_s) {
             Some(growth_per_s) => Err(Verdict::UnstableProcess { growth_per_s }),
             None => Ok(()),
         }

@@ -40,7 +40,8 @@ pub(crate) const MOST_INPUT_F: f64 = 1.88;
 /// F statistic of twenty past outputs in the input. Above: the input is fed back. Argument: as [`MOST_INPUT_F`].
 pub(crate) const FED_BACK: f64 = 1.88;
 /// Share of the variance of the last third that a fit to the first two explains. Below, with an error above
-/// [`EXPECTED_ERROR_RATIO`]: `weak_prediction`. Campaign: `any_open.toml`, 3 % of right recordings.
+/// [`EXPECTED_ERROR_RATIO`]: `weak_prediction`. Campaign: `any_open.toml`, 3 % of right recordings. Below, it may be that the process
+/// grows by itself. Campaign: `any_closed.toml`, no recording of 900.
 pub(crate) const WELL_PREDICTED: f64 = 0.9;
 /// The same. Below, with an error above [`MOST_ERROR_RATIO`]: `not_this_process`. Campaign: `any_open.toml`, 1 %, all of six seconds.
 pub(crate) const LEAST_PREDICTED: f64 = 0.7;
@@ -57,7 +58,8 @@ pub(crate) const CALM_END: f64 = 0.1;
 /// Share of the output's square that a fit without disturbances may leave under feedback. Above: the disturbances stay. Argument: an
 /// input that followed all of the disturbance would bias the response by the root, 20 %; it follows a part.
 pub(crate) const LEFT_UNDER_FEEDBACK: f64 = 0.04;
-/// Distance of the root from one, in standard deviations. Above: `not_this_process`. Argument: chance, once in 30,000.
+/// Distance of a polynomial below zero between one and its root, in standard deviations. Above: the root is above one, and the process
+/// `not_this_process`. Argument: chance, once in 30,000.
 pub(crate) const SURE: f64 = 4.0;
 /// Misfit of the last cycles of a relay test (share of the output). Above: `misfit`. Judgement: the difference can be seen.
 pub(crate) const MUCH_MISFIT: f64 = 0.01;

@@ -1,42 +1,42 @@
-//! Prediction of the output from two past outputs and four past inputs, by least squares over the blocks:
+//! Prediction of the output from past outputs and past inputs, by least squares over the blocks:
 //!
 //! ```text
-//! y(k) = a1 y(k-1) + a2 y(k-2) + b1 u(k-1) + ... + b4 u(k-4) + c,      z^2 = a1 z + a2
+//! y(k) = a1 y(k-1) + ... + ap y(k-p) + b1 u(k-1) + ... + bn u(k-n) + c,      A(z) = z^p - a1 z^(p-1) - ... - ap
 //! ```
 //!
 //! It needs no start, so its roots are starts for fits that do, and it shows a root outside the unit circle whatever the controller
-//! is. Noise in the regressors draws the roots inwards. Reference: L. Ljung, "System Identification" (1999), sections 7.3 and 13.4.
+//! is. Noise in the regressors draws the roots of two outputs inwards; more outputs take the noise for what it is.
+//! References: L. Ljung, "System Identification" (1999), sections 7.3 and 13.4; on the test of a root above one P. C. B. Phillips,
+//! Y. Wu, J. Yu, Int. Econ. Rev. 52 (2011).
 
 use std::ops::Range;
+
+use onecycle_design::roots;
 
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
 
-/// Past inputs of the prediction.
-const INPUTS: usize = 4;
-
-/// A fit of the prediction.
-pub(super) struct Arx {
-    /// `a1` and `a2`.
-    pub(super) a: [f64; 2],
+/// A fit of the prediction from `P` past outputs.
+pub(super) struct Arx<const P: usize> {
+    /// `a1` to `ap`.
+    a: [f64; P],
     /// Covariance of these.
-    pub(super) covariance: [[f64; 2]; 2],
+    covariance: [[f64; P]; P],
 }
 
-impl Arx {
-    /// Fit to the blocks of `part`. `None` of too few, or if the regressors depend on each other.
-    pub(super) fn of(blocks: &Blocks<'_>, part: Range<usize>) -> Option<Self> {
+impl<const P: usize> Arx<P> {
+    /// Fit to the blocks of `part` with so many past inputs. `None` of too few, or if the regressors depend on each other.
+    pub(super) fn of(blocks: &Blocks<'_>, part: Range<usize>, past: usize) -> Option<Self> {
         let inputs = blocks.mean_inputs();
         let output = |block: usize| blocks.mean_output(block).unwrap_or(0.0);
-        let rows: Vec<usize> = (part.start + INPUTS..part.end)
-            .filter(|row| (row - 2..=*row).all(|block| blocks.present(block) > 0))
+        let rows: Vec<usize> = (part.start + past.max(P)..part.end)
+            .filter(|row| (row - P..=*row).all(|block| blocks.present(block) > 0))
             .collect();
         let column = |value: &dyn Fn(usize) -> f64| rows.iter().map(|row| value(*row)).collect();
-        let mut columns: Vec<Vec<f64>> = vec![
-            column(&|row| output(row - 1)),
-            column(&|row| output(row - 2)),
-        ];
-        columns.extend((1..=INPUTS).map(|lag| column(&|row| inputs[row - lag])));
+        let mut columns: Vec<Vec<f64>> = (1..=P)
+            .map(|lag| column(&|row| output(row - lag)))
+            .collect();
+        columns.extend((1..=past).map(|lag| column(&|row| inputs[row - lag])));
         columns.push(vec![1.0; rows.len()]);
         let y: Vec<f64> = column(&output);
         let freedom = rows
@@ -46,15 +46,37 @@ impl Arx {
         let regressors = Orthogonal::new(&columns)?;
         let (rest, x) = regressors.solve(&y);
         let variance = rest.iter().map(|r| r * r).sum::<f64>() / freedom as f64;
-        let covariance = regressors.covariance(&[0, 1]);
+        let covariance = regressors.covariance(&std::array::from_fn(|i| i));
         Some(Self {
-            a: [x[0], x[1]],
-            covariance: std::array::from_fn(|i| {
-                std::array::from_fn(|j| variance * covariance[i][j])
-            }),
+            a: std::array::from_fn(|i| x[i]),
+            covariance: covariance.map(|row| row.map(|of_one| variance * of_one)),
         })
     }
 
+    /// A real root of `A` above one, if between one and it `A` is negative by more than `sure` standard deviations: at one, or in the
+    /// middle where a walk puts another root at one. The deviation of the root itself would not tell it from two roots at one, of an
+    /// integrator and of a walk, that noise parts.
+    pub(super) fn root_above_one(&self, sure: f64) -> Option<f64> {
+        // Horner's scheme.
+        let value = |z: f64| self.a.iter().fold(1.0, |sum, a| sum * z - a);
+        if value(1.0) >= 0.0 {
+            return None;
+        }
+        // A is positive beyond the sum of the sizes of its coefficients.
+        let most = 1.0 + self.a.iter().map(|a| a.abs()).sum::<f64>();
+        let root = roots::root(value, 1.0, most, 1e-12);
+        let is_negative = |z: f64| {
+            let powers: [f64; P] = std::array::from_fn(|i| z.powi((P - 1 - i) as i32));
+            let square: f64 = (powers.iter().zip(&self.covariance))
+                .flat_map(|(p, row)| row.iter().zip(&powers).map(move |(c, q)| p * c * q))
+                .sum();
+            value(z) < -sure * square.sqrt()
+        };
+        (is_negative(1.0) || is_negative(0.5 * (1.0 + root))).then_some(root)
+    }
+}
+
+impl Arx<2> {
     /// `c1` and `c0` of the denominator `s^2 + c1 s + c0` (1/s, 1/s^2) with the same poles at samples of `step_s`. `None` if a
     /// root is not a pole of a continuous process.
     pub(super) fn pair(&self, step_s: f64) -> Option<[f64; 2]> {

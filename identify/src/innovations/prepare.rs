@@ -1,5 +1,6 @@
 //! From the columns of a recording to a record: the part to use, its grid, lost and stale samples.
 
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use onecycle_design::LowPass;
@@ -30,6 +31,8 @@ const ALIKE: f64 = 0.9;
 /// Share of the movement of an output to which a sample is believed. No sensor is truer, and no process follows a model to less:
 /// without it a simulation without noise has resonances and forces of a ten-thousandth.
 pub(super) const FLOOR: f64 = 1e-3;
+/// Harmonics of the sawtooth that a rounding error is.
+const HARMONICS: u32 = 1000;
 /// Parts of a record in which its movement is measured, so that a slow drift does not count as movement.
 const PARTS: usize = 8;
 
@@ -111,14 +114,32 @@ fn movement(record: &Record) -> f64 {
     (sum / outputs.len().max(1) as f64).sqrt()
 }
 
-/// Standard deviation of the rounding error of a sample (output unit), and how many other samples share its level on average, and with it
-/// its error: beside them a sample is believed to the deviation times the root of their number. The error of an output that
-/// never repeats is white, and the fit sees it.
+/// Standard deviation of the rounding error of a sample (output unit), and how many other samples share it on average: beside
+/// them a sample is believed to the deviation times the root of their number. The error of an output that never repeats
+/// is white, and the fit sees it; so is the part of it that noise makes ([`shared`]).
 fn rounding(record: &Record) -> (f64, f64) {
     let outputs: Vec<f64> = record.present_outputs().collect();
-    let levels = outputs.chunk_by(|a, b| a == b).count();
-    let sharing = (outputs.len() - levels) as f64 / levels as f64;
-    (rounding_deviation(&outputs), sharing)
+    let runs: Vec<&[f64]> = outputs.chunk_by(|a, b| a == b).collect();
+    let count = outputs.len() as f64;
+    let sharing = count / runs.len() as f64 - 1.0;
+    let back = runs
+        .windows(3)
+        .filter(|runs| runs[1].len() == 1 && runs[0][0] == runs[2][0]);
+    let noise = back.count() as f64 / count * PI.sqrt();
+    (rounding_deviation(&outputs), sharing * shared(noise))
+}
+
+/// Share of the variance of a rounding error that samples near one true output have in common under white noise of
+/// standard deviation `noise`, in steps of the rounding.
+///
+/// The error is a sawtooth of the output, of which harmonic k has a share of the variance like 1/k^2. Its mean under normal noise is
+/// smaller by exp(-(2 pi k noise)^2 / 2), and the variance of the mean by the square of that.
+fn shared(noise: f64) -> f64 {
+    let harmonics = |noise: f64| -> f64 {
+        let harmonic = |k: f64| (-(TAU * k * noise).powi(2)).exp() / (k * k);
+        (1..=HARMONICS).map(|k| harmonic(f64::from(k))).sum()
+    };
+    harmonics(noise) / harmonics(0.0)
 }
 
 /// The longest run of indices of `asked` between gaps.
@@ -328,6 +349,9 @@ fn is_regular(record: &Record, present: &[usize]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use onecycle_plant::{Noise, NoiseSource};
+    use statrs::distribution::{ContinuousCDF, Normal};
+
     use super::*;
 
     fn ramp(count: usize) -> Vec<f64> {
@@ -415,6 +439,39 @@ mod tests {
         assert!((floor(&staircase).1 - (2_f64 / 12.0).sqrt()).abs() < 1e-12);
         let rising: Vec<f64> = (0..300).map(f64::from).collect();
         assert_eq!(floor(&rising), (1.0 / 12_f64.sqrt(), 0.0));
+    }
+
+    // By quadrature over the true output: the mean of what is read, from the probability that noise lifts it above each edge.
+    #[test]
+    fn noise_leaves_the_mean_of_a_rounding_error_to_the_samples_in_common() {
+        for noise in [0.05, 0.1, 0.2, 0.4] {
+            let normal = Normal::new(0.0, noise).unwrap();
+            let error = |x: f64| {
+                (-4..4)
+                    .map(|k| normal.cdf(x - f64::from(k) - 0.5))
+                    .sum::<f64>()
+                    - 4.0
+                    - x
+            };
+            let squares = (0..1000).map(|k| error(f64::from(k) / 1000.0).powi(2));
+            let square = squares.sum::<f64>() / 1000.0;
+            assert!((12.0 * square - shared(noise)).abs() < 2e-3, "{noise}");
+        }
+    }
+
+    // A ramp of 20 samples a level with noise of an eighth of a step, which a third of the changes go straight back for.
+    #[test]
+    fn levels_that_flicker_share_less() {
+        let times_s: Vec<f64> = (0..20_000).map(|k| 0.01 * f64::from(k)).collect();
+        let mut noise = Noise::from_seed(7);
+        let read = |k: i32| (f64::from(k) / 20.0 + 0.125 * noise.standard_normal()).round();
+        let output: Vec<f64> = (0..20_000).map(read).collect();
+        let record = gridded(&times_s, &ramp(20_000), &output, &[true; 20_000]);
+        let (deviation, sharing) = rounding(&record);
+        assert_eq!(deviation, 1.0 / 12_f64.sqrt());
+        let changes = output.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let each = 20_000.0 / (changes as f64 + 1.0) - 1.0;
+        assert!((sharing / each / shared(0.125) - 1.0).abs() < 0.2);
     }
 
     #[test]

@@ -334,7 +334,7 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
 /// points of any grid.
 fn predicted(base: Theta, blocks: &Blocks<'_>) -> Option<Theta> {
     let dt_s = blocks.block_s();
-    let [c1, c0] = Arx::of(blocks, 0..blocks.len())?.pair(dt_s)?;
+    let [c1, c0] = Arx::<2>::of(blocks, 0..blocks.len(), 4)?.pair(dt_s)?;
     let layout = base.layout();
     let mut theta = base;
     if let Some(pair) = layout.pair() {
