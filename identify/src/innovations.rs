@@ -75,6 +75,7 @@ use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{
     Evidence, Fit, Identification, Identified, InnovationTests, Prediction, Refused,
 };
+use crate::posterior::{Draw, Posterior};
 use crate::progress::part;
 use crate::remark::Remark;
 use crate::remarks;
@@ -155,9 +156,6 @@ impl Search<'_> {
         let fitted = part(0.0..FITTED, || {
             Fitted::new(&prepared, outliers, self.options, &mut self.remarks)
         })?;
-        if is_assumed && !begins_at_rest(&fitted) {
-            return Err(Verdict::ConstantInput);
-        }
         let blocks = fitted.blocks();
         let components = part(FITTED..TESTED, || fitted.posterior(&blocks));
         let tests = validate::tests(&blocks, &fitted.best.found.at);
@@ -174,7 +172,11 @@ impl Search<'_> {
         let outcome = judged.and_then(|()| {
             self.remark(&fitted, &tests, prediction.as_ref());
             let checked = (tests, prediction);
-            self.design(&prepared, &fitted, &blocks, &components, checked)
+            let found = self.design(&prepared, &fitted, &blocks, &components, checked)?;
+            match is_assumed && !begins_at_rest(&found.posterior, fitted.record.dt_s) {
+                true => Err(Verdict::ConstantInput),
+                false => Ok(found),
+            }
         });
         if outcome.is_err() {
             let fit = fit(&fitted, &blocks, prepared.start_s, (tests, prediction, 1.0));
@@ -410,23 +412,20 @@ pub(crate) fn is_as_expected(prediction: &Prediction) -> bool {
     prediction.is_good() && prediction.is_as_good_as_disturbances_allow()
 }
 
-/// Whether the response to a step before the first row begins as one from rest: with dead time or a second lag of at least
-/// three samples. A single exponential can begin anywhere, as after a step long ago.
-fn begins_at_rest(fitted: &Fitted) -> bool {
-    let theta = &fitted.best.found.theta;
-    let process = theta.process(1.0);
-    let lags_s: Vec<f64> = match theta.real_lags_s() {
-        Some((slow_s, fast_s)) => vec![slow_s, fast_s],
-        None => vec![1.0 / process.pole_per_s()],
+/// Whether the response to a step before the first row begins as one from rest: in 95 % of the likely processes behind a dead time and
+/// shorter lags of more than a sample. A single exponential can begin anywhere, as after a step long ago.
+fn begins_at_rest(posterior: &Posterior, sample_s: f64) -> bool {
+    let late_s = |draw: &Draw| {
+        let of = |parameter| draw.value(parameter).unwrap_or(0.0);
+        let of_pair = |rad_per_s| 2.0 * of(Parameter::Zeta) / rad_per_s;
+        let shorter = [Parameter::Tau, Parameter::TProp, Parameter::TProp2].map(of);
+        let pair_s = draw.value(Parameter::NaturalFrequency).map_or(0.0, of_pair);
+        shorter.iter().sum::<f64>() + pair_s
     };
-    let stages = theta.structure.stages();
-    let every = lags_s
-        .iter()
-        .chain(&process.lags_s()[..stages.lags])
-        .copied();
-    let slowest_s = every.clone().fold(0.0, f64::max);
-    let late_s = every.sum::<f64>() - slowest_s + theta.tau_s();
-    stages.integrators == 0 && late_s >= 3.0 * fitted.record.dt_s
+    let draws = posterior.draws();
+    let late = draws.iter().filter(|draw| late_s(draw) > sample_s).count();
+    posterior.estimate().structure().stages().integrators == 0
+        && late as f64 > 0.95 * draws.len() as f64
 }
 
 /// The fit as a result. `None` if the filter does not converge.

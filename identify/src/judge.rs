@@ -126,13 +126,16 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
                 found.refuse(verdict);
             }
         }
-        // One row at another level is no relay, but an input that changes.
-        Some(Err(Verdict::ConstantInput)) if !is_constant(used.input) => {}
+        // One row at another level is no relay, but an input that changes; so is a level that is not the one before.
+        Some(Err(Verdict::ConstantInput))
+            if !is_constant(used.input) || options.input_before.is_some() => {}
         Some(Err(
             verdict @ (Verdict::ConstantInput
             | Verdict::NotSteady { .. }
             | Verdict::Saturated { .. }),
-        )) if found.outcome.is_err() => found.outcome = Err(verdict),
+        )) if found.outcome.is_err() => {
+            found.outcome = Err(verdict);
+        }
         // Complex poles explain a limit cycle that the input does not drive.
         Some(Err(verdict @ Verdict::NotSteady { .. }))
             if is_oscillating(&found) && !owes_nothing(&found) =>

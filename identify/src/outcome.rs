@@ -298,7 +298,7 @@ pub struct Innovations {
     pub prediction: Option<Prediction>,
     /// Factor by which the deviations were widened because the innovations are not white; 1 if they are.
     pub widened: f64,
-    /// Rows of the fit in order of time.
+    /// Rows of the fit that have a sample, in order of time.
     pub rows: Vec<InnovationRow>,
 }
 
@@ -414,12 +414,12 @@ impl Prediction {
 pub struct InnovationRow {
     /// Mean time of the samples (s).
     pub time_s: f64,
-    /// Mean of the measured outputs (output unit). `None` if no sample is present.
-    pub measured: Option<f64>,
+    /// Mean of the measured outputs (output unit).
+    pub measured: f64,
     /// Output of the model without disturbances (output unit).
     pub simulated: f64,
-    /// Innovation over its standard deviation. `None` if no sample is present.
-    pub innovation: Option<f64>,
+    /// Innovation over its standard deviation.
+    pub innovation: f64,
     /// Output predicted from the rows before (output unit).
     pub predicted: f64,
     /// Disturbance at the process input, estimated from the rows before (input unit).

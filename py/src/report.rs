@@ -152,7 +152,6 @@ fn raw(report: &impl serde::Serialize) -> String {
 }
 
 fn rows<'py>(py: Python<'py>, identified: &Identified) -> Vec<Column<'py>> {
-    let nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
     let Some(innovations) = identified.fit.innovations() else {
         let points = &identified.fit.points;
         return [
@@ -172,12 +171,12 @@ fn rows<'py>(py: Python<'py>, identified: &Identified) -> Vec<Column<'py>> {
             "time_s",
             of.iter().map(|row| row.time_s).collect::<Vec<_>>(),
         ),
-        ("measured", of.iter().map(|row| nan(row.measured)).collect()),
+        ("measured", of.iter().map(|row| row.measured).collect()),
         ("simulated", of.iter().map(|row| row.simulated).collect()),
         ("predicted", of.iter().map(|row| row.predicted).collect()),
         (
             "innovation",
-            of.iter().map(|row| nan(row.innovation)).collect(),
+            of.iter().map(|row| row.innovation).collect(),
         ),
         (
             "disturbance",

@@ -78,24 +78,27 @@ pub(super) fn innovations(
     let mut rows = Vec::with_capacity(blocks.len());
     let mut points = Vec::with_capacity(blocks.len());
     for block in 0..blocks.len() {
+        // Without a sample there is no mean to compare.
+        let Some(measured) = blocks.mean_output(block) else {
+            continue;
+        };
         let range = blocks.range(block);
         let middle =
             0.5 * (blocks.record.time_s(range.start) + blocks.record.time_s(range.end - 1));
         let time_s = start_s + middle;
-        let measured = blocks.mean_output(block);
         rows.push(InnovationRow {
             time_s,
             measured,
             simulated: predicted.simulated[block],
-            innovation: measured.and_then(|_| values.next()),
+            innovation: values.next()?,
             predicted: predicted.predicted[block],
             disturbance: predicted.disturbance[block],
         });
-        points.extend(measured.map(|measured| FitPoint {
+        points.push(FitPoint {
             time_s,
             measured,
             fitted: predicted.simulated[block],
-        }));
+        });
     }
     let alternatives = (fitted.choice.within(HOPELESS))
         .map(|candidate| Alternative {

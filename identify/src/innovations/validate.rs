@@ -1,6 +1,7 @@
 //! Tests of a fit: innovations, prediction of data that it was not fitted to, information.
 
 use std::f64::consts::{PI, SQRT_2, TAU};
+use std::ops::Range;
 
 use super::choose::Limits;
 use super::descent::{Found, Patience};
@@ -262,8 +263,13 @@ pub(super) fn prediction(
     }
     // Where the input hardly moves the output any more, since it has settled or is too fast, nothing is left to predict: what the
     // whole record moves by is the measure then.
-    let (of_all, of_end) = (&found.forced[..], &found.forced[blocks.len()..]);
-    let every: Vec<f64> = match variance(of_end) < CALM_END * variance(of_all) {
+    // Blocks without a sample have no response.
+    let forced = |rows: Range<usize>| -> f64 {
+        let present = rows.filter(|row| whole.present(*row) > 0);
+        variance(&present.map(|row| found.forced[row]).collect::<Vec<f64>>())
+    };
+    let is_calm = forced(blocks.len()..whole.len()) < CALM_END * forced(0..whole.len());
+    let every: Vec<f64> = match is_calm {
         true => (0..whole.len()).filter_map(measured).collect(),
         false => pairs.iter().map(|(value, _)| *value).collect(),
     };

@@ -1,7 +1,7 @@
 //! Step tests, square waves and drift: recordings without a steady oscillation, against exact solutions.
 
 use onecycle_design::{Parameter, Structure};
-use onecycle_identify::{Identification, Options, Remark, Signals, Verdict, identify};
+use onecycle_identify::{Evidence, Identification, Options, Remark, Signals, Verdict, identify};
 use onecycle_plant::{Noise, NoiseSource};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -113,6 +113,26 @@ fn a_step_in_the_first_row_is_one_from_zero_or_from_the_stated_input() {
     let stated = test.identify(&Options::default().input_before(Some(0.2)));
     is_heater(&stated, "stated");
     assert!(!stated.remarks.contains(&Remark::AssumedRest));
+}
+
+// Stamps 4 and 3 s apart leave five of seven points of their grid without a sample. The end is calm all the same, and no row of the
+// fit is one without a sample, where the model's mean over none is zero.
+#[test]
+fn a_settled_end_with_uneven_stamps_is_no_failure_of_prediction() {
+    let times_s = (0..3600).filter(|k| matches!(k % 7, 0 | 4)).map(f64::from);
+    let test = Test::at(times_s.collect(), &[(0.0, 0.5)], &|since| {
+        response(HEATER, since)
+    });
+    let found = test.identify(&Options::default());
+    is_heater(&found, "uneven");
+    let identified = found.outcome.unwrap();
+    let Evidence::Innovations(innovations) = &identified.fit.evidence else {
+        panic!("one objective");
+    };
+    assert!(innovations.prediction.unwrap().explained > 0.999);
+    for row in &innovations.rows {
+        assert!((row.measured - row.simulated).abs() < 0.5, "{row:?}");
+    }
 }
 
 // Before a test that starts in the first row the process was at rest, but not under the first input. After a dead time as long as

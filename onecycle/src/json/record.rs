@@ -120,10 +120,10 @@ impl From<&Innovations> for Tests {
 #[derive(Serialize)]
 pub(super) struct Rows {
     time_s: Vec<f64>,
-    measured: Vec<Option<f64>>,
+    measured: Vec<f64>,
     simulated: Vec<f64>,
     predicted: Vec<f64>,
-    innovation: Vec<Option<f64>>,
+    innovation: Vec<f64>,
     disturbance: Vec<f64>,
 }
 

@@ -291,7 +291,7 @@ class Report(_Shown):
 
     @cached_property
     def rows(self) -> Arrays:
-        """The fit row by row, as arrays of equal length: `time_s`, `measured` (NaN where absent), `simulated` (without disturbances),
+        """The fit row by row, as arrays of equal length: `time_s`, `measured`, `simulated` (without disturbances),
         and of a fit to the whole recording `predicted` (from the rows before), `innovation` (error of the prediction over its
         deviation) and `disturbance` (at the input). Empty without a fit in time."""
         return _read_only(dict(self._inner.rows()))

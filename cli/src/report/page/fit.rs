@@ -37,7 +37,7 @@ pub(super) fn section(title: &str, structure: Structure, fit: &Fit, units: &Unit
         Some(found) => (
             over_record(&fit.points, found, units),
             "innovations",
-            found.rows.iter().filter_map(|row| row.innovation).collect(),
+            found.rows.iter().map(|row| row.innovation).collect(),
         ),
     };
     let mut body = page::figure(&figure);
@@ -92,7 +92,7 @@ fn over_cycles(fit: &[FitPoint], units: &Units) -> Figure {
 }
 
 fn over_record(fit: &[FitPoint], found: &Innovations, units: &Units) -> Figure {
-    let innovations = (found.rows.iter()).filter_map(|row| Some((row.time_s, row.innovation?)));
+    let innovations = (found.rows.iter()).map(|row| (row.time_s, row.innovation));
     let disturbance = (found.rows.iter()).map(|row| (row.time_s, row.disturbance));
     let panel = |title: String, marks, hue, points| {
         let series = Series::of_points("", marks, points).hue(hue);
