@@ -73,14 +73,14 @@ use crate::assumed::recorded_filter;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{
-    Evidence, Fit, Identification, Identified, InnovationTests, Prediction, Refused,
+    Evidence, Fit, FitPoint, Identification, Identified, InnovationTests, Prediction, Refused,
 };
 use crate::posterior::{Draw, Posterior};
 use crate::progress::part;
 use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
-use crate::signals::{Signals, is_constant};
+use crate::signals::Signals;
 use crate::thresholds::{
     ANOTHER_KIND, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED, MOST_DEVIATION,
     MOST_ERROR_RATIO, MOST_TAKEN, STRONGLY_COLOURED, WELL_PREDICTED,
@@ -146,8 +146,7 @@ impl Search<'_> {
             let delay_s = filter.time_s();
             self.remarks.push(Remark::OutputFilter { delay_s });
         }
-        let is_assumed = self.options.input_before.is_none() && is_constant(&prepared.record.input);
-        if is_assumed {
+        if self.options.assumes_rest(&prepared.record.input) {
             self.remarks.push(Remark::AssumedRest);
         }
         if prepared.part_used < 0.999 {
@@ -172,11 +171,7 @@ impl Search<'_> {
         let outcome = judged.and_then(|()| {
             self.remark(&fitted, &tests, prediction.as_ref());
             let checked = (tests, prediction);
-            let found = self.design(&prepared, &fitted, &blocks, &components, checked)?;
-            match is_assumed && !begins_at_rest(&found.posterior, fitted.record.dt_s) {
-                true => Err(Verdict::ConstantInput),
-                false => Ok(found),
-            }
+            self.design(&prepared, &fitted, &blocks, &components, checked)
         });
         if outcome.is_err() {
             let fit = fit(&fitted, &blocks, prepared.start_s, (tests, prediction, 1.0));
@@ -376,6 +371,10 @@ impl Search<'_> {
             is_wider.then_some(ratio.sqrt()),
         );
         let model = result::model(&fitted.best.found, prepared.early_s);
+        let is_assumed = self.options.assumes_rest(&fitted.record.input);
+        if is_assumed && !begins_at_rest(model.structure(), &posterior, fitted.record.dt_s) {
+            return Err(Verdict::ConstantInput);
+        }
         let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
         let filter = recorded_filter(prepared.filter, &model);
         let recorded = fitted.recorded_loop(excited, prepared.rounding, filter);
@@ -414,7 +413,7 @@ pub(crate) fn is_as_expected(prediction: &Prediction) -> bool {
 
 /// Whether the response to a step before the first row begins as one from rest: in 95 % of the likely processes behind a dead time and
 /// shorter lags of more than a sample. A single exponential can begin anywhere, as after a step long ago.
-fn begins_at_rest(posterior: &Posterior, sample_s: f64) -> bool {
+fn begins_at_rest(structure: Structure, posterior: &Posterior, sample_s: f64) -> bool {
     let late_s = |draw: &Draw| {
         let of = |parameter| draw.value(parameter).unwrap_or(0.0);
         let of_pair = |rad_per_s| 2.0 * of(Parameter::Zeta) / rad_per_s;
@@ -424,8 +423,7 @@ fn begins_at_rest(posterior: &Posterior, sample_s: f64) -> bool {
     };
     let draws = posterior.draws();
     let late = draws.iter().filter(|draw| late_s(draw) > sample_s).count();
-    posterior.estimate().structure().stages().integrators == 0
-        && late as f64 > 0.95 * draws.len() as f64
+    structure.stages().integrators == 0 && late as f64 > 0.95 * draws.len() as f64
 }
 
 /// The fit as a result. `None` if the filter does not converge.
@@ -436,10 +434,15 @@ fn fit(
     checked: (InnovationTests, Option<Prediction>, f64),
 ) -> Option<Fit> {
     let explained = checked.1.map_or(1.0, |prediction| prediction.explained);
-    let (innovations, points) = result::innovations(fitted, blocks, start_s, checked)?;
+    let innovations = result::innovations(fitted, blocks, start_s, checked)?;
+    let points = innovations.rows.iter().map(|row| FitPoint {
+        time_s: row.time_s,
+        measured: row.measured,
+        fitted: row.simulated,
+    });
     Some(Fit {
         misfit: (1.0 - explained).max(0.0).sqrt(),
-        points,
+        points: points.collect(),
         evidence: Evidence::Innovations(innovations),
     })
 }

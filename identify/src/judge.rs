@@ -18,7 +18,7 @@ use crate::outcome::Identification;
 use crate::relay;
 use crate::remark::Remark;
 use crate::settings::Options;
-use crate::signals::{Signals, is_constant, range};
+use crate::signals::{Signals, range};
 use crate::thresholds::{LEAST_SAMPLE_S, MOST_INPUT_F};
 use crate::verdict::Verdict;
 
@@ -126,16 +126,13 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
                 found.refuse(verdict);
             }
         }
-        // One row at another level is no relay, but an input that changes; so is a level that is not the one before.
-        Some(Err(Verdict::ConstantInput))
-            if !is_constant(used.input) || options.input_before.is_some() => {}
+        // An input is no relay, but changes, if one row is at another level, or all are at another than before the first.
+        Some(Err(Verdict::ConstantInput)) if !options.assumes_rest(used.input) => {}
         Some(Err(
             verdict @ (Verdict::ConstantInput
             | Verdict::NotSteady { .. }
             | Verdict::Saturated { .. }),
-        )) if found.outcome.is_err() => {
-            found.outcome = Err(verdict);
-        }
+        )) if found.outcome.is_err() => found.outcome = Err(verdict),
         // Complex poles explain a limit cycle that the input does not drive.
         Some(Err(verdict @ Verdict::NotSteady { .. }))
             if is_oscillating(&found) && !owes_nothing(&found) =>

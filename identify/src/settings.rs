@@ -3,6 +3,7 @@
 use onecycle_design::{Specification, Structure};
 
 use crate::innovations::Hold;
+use crate::signals::is_constant;
 
 /// Maximum number of cycles that a fit can use: the window of the estimator has room for the switches of 50 cycles.
 pub const MOST_CYCLES: usize = 50;
@@ -149,6 +150,11 @@ impl Options {
             input_before,
             ..self
         }
+    }
+
+    /// Whether rest under zero before the first row is taken for granted: nobody has stated another input, and this one never changes.
+    pub(crate) fn assumes_rest(&self, input: &[f64]) -> bool {
+        self.input_before.is_none() && is_constant(input)
     }
 
     /// Takes a low-pass of this cutoff (Hz) out of the output, or none if `None`.

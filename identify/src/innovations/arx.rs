@@ -5,7 +5,7 @@
 //! ```
 //!
 //! It needs no start, so its roots are starts for fits that do, and it shows a root outside the unit circle whatever the controller
-//! is. Noise in the regressors draws the roots of two outputs inwards; more outputs take the noise for what it is.
+//! is. With two past outputs the noise of the sensor draws the roots inwards; more of them model the noise too.
 //! References: L. Ljung, "System Identification" (1999), sections 7.3 and 13.4; on the test of a root above one P. C. B. Phillips,
 //! Y. Wu, J. Yu, Int. Econ. Rev. 52 (2011).
 
@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use onecycle_design::roots;
 
+use super::lifted::dot;
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
 
@@ -25,7 +26,8 @@ pub(super) struct Arx<const P: usize> {
 }
 
 impl<const P: usize> Arx<P> {
-    /// Fit to the blocks of `part` with so many past inputs. `None` of too few, or if the regressors depend on each other.
+    /// Fit to the blocks of `part` with `past` inputs. `None` if there are fewer blocks than unknowns, or if one column of past outputs
+    /// and inputs is a combination of the others.
     pub(super) fn of(blocks: &Blocks<'_>, part: Range<usize>, past: usize) -> Option<Self> {
         let inputs = blocks.mean_inputs();
         let output = |block: usize| blocks.mean_output(block).unwrap_or(0.0);
@@ -53,9 +55,9 @@ impl<const P: usize> Arx<P> {
         })
     }
 
-    /// A real root of `A` above one, if between one and it `A` is negative by more than `sure` standard deviations: at one, or in the
-    /// middle where a walk puts another root at one. The deviation of the root itself would not tell it from two roots at one, of an
-    /// integrator and of a walk, that noise parts.
+    /// A real root of `A` above one, if `A` is negative by more than `sure` standard deviations at one or half-way to the root. A disturbance
+    /// that is a random walk makes `A(1)` zero, so the middle counts too. The deviation of the root itself is no measure: an integrator
+    /// and a walk have two roots at one, which any noise parts.
     pub(super) fn root_above_one(&self, sure: f64) -> Option<f64> {
         // Horner's scheme.
         let value = |z: f64| self.a.iter().fold(1.0, |sum, a| sum * z - a);
@@ -67,10 +69,8 @@ impl<const P: usize> Arx<P> {
         let root = roots::root(value, 1.0, most, 1e-12);
         let is_negative = |z: f64| {
             let powers: [f64; P] = std::array::from_fn(|i| z.powi((P - 1 - i) as i32));
-            let square: f64 = (powers.iter().zip(&self.covariance))
-                .flat_map(|(p, row)| row.iter().zip(&powers).map(move |(c, q)| p * c * q))
-                .sum();
-            value(z) < -sure * square.sqrt()
+            let products = std::array::from_fn(|i| dot(&self.covariance[i], &powers));
+            value(z) < -sure * dot(&powers, &products).sqrt()
         };
         (is_negative(1.0) || is_negative(0.5 * (1.0 + root))).then_some(root)
     }

@@ -441,7 +441,8 @@ mod tests {
         assert_eq!(floor(&rising), (1.0 / 12_f64.sqrt(), 0.0));
     }
 
-    // By quadrature over the true output: the mean of what is read, from the probability that noise lifts it above each edge.
+    // The true output x is read as the number of edges between levels that x plus noise is above, so the mean of the readings is the sum
+    // of the probabilities. Its error, squared, is averaged over x.
     #[test]
     fn noise_leaves_the_mean_of_a_rounding_error_to_the_samples_in_common() {
         for noise in [0.05, 0.1, 0.2, 0.4] {
@@ -459,7 +460,7 @@ mod tests {
         }
     }
 
-    // A ramp of 20 samples a level with noise of an eighth of a step, which a third of the changes go straight back for.
+    // A ramp of 20 samples a level, with noise of an eighth of a step.
     #[test]
     fn levels_that_flicker_share_less() {
         let times_s: Vec<f64> = (0..20_000).map(|k| 0.01 * f64::from(k)).collect();

@@ -11,9 +11,7 @@ use super::prediction::{Filtering, predict};
 use super::record::Blocks;
 use super::search::Candidate;
 use super::theta::{Bounds, NoiseKind, Theta};
-use crate::outcome::{
-    Alternative, FitPoint, InnovationRow, InnovationTests, Innovations, Noise, Prediction,
-};
+use crate::outcome::{Alternative, InnovationRow, InnovationTests, Innovations, Noise, Prediction};
 
 /// Damping ratio below which a resonance hardly depends on the input.
 const LEAST_ZETA: f64 = 0.005;
@@ -65,18 +63,17 @@ fn noise_of(candidate: &Candidate) -> Noise {
     }
 }
 
-/// The innovations with their tests, and the fit to the measured output. `None` if the filter does not converge.
+/// The innovations with their tests, row by row. `None` if the filter does not converge.
 pub(super) fn innovations(
     fitted: &Fitted,
     blocks: &Blocks<'_>,
     start_s: f64,
     (whiteness, prediction, widened): (InnovationTests, Option<Prediction>, f64),
-) -> Option<(Innovations, Vec<FitPoint>)> {
+) -> Option<Innovations> {
     let found = &fitted.best.found;
     let predicted = predict(blocks, &found.theta, &found.at, Filtering::default())?;
     let mut values = found.at.innovations().into_iter();
     let mut rows = Vec::with_capacity(blocks.len());
-    let mut points = Vec::with_capacity(blocks.len());
     for block in 0..blocks.len() {
         // Without a sample there is no mean to compare.
         let Some(measured) = blocks.mean_output(block) else {
@@ -94,11 +91,6 @@ pub(super) fn innovations(
             predicted: predicted.predicted[block],
             disturbance: predicted.disturbance[block],
         });
-        points.push(FitPoint {
-            time_s,
-            measured,
-            fitted: predicted.simulated[block],
-        });
     }
     let alternatives = (fitted.choice.within(HOPELESS))
         .map(|candidate| Alternative {
@@ -111,7 +103,7 @@ pub(super) fn innovations(
             bic: candidate.bic,
         })
         .collect();
-    let innovations = Innovations {
+    Some(Innovations {
         noise: noise_of(&fitted.best),
         nonlinear: forces::nonlinear(found, &fitted.record.forces),
         log_likelihood: found.at.log_likelihood,
@@ -121,6 +113,5 @@ pub(super) fn innovations(
         prediction,
         widened,
         rows,
-    };
-    Some((innovations, points))
+    })
 }

@@ -334,6 +334,7 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
 /// points of any grid.
 fn predicted(base: Theta, blocks: &Blocks<'_>) -> Option<Theta> {
     let dt_s = blocks.block_s();
+    // Two poles, and four inputs for a dead time of up to two blocks.
     let [c1, c0] = Arx::<2>::of(blocks, 0..blocks.len(), 4)?.pair(dt_s)?;
     let layout = base.layout();
     let mut theta = base;

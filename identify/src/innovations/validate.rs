@@ -262,8 +262,7 @@ pub(super) fn prediction(
         return None;
     }
     // Where the input hardly moves the output any more, since it has settled or is too fast, nothing is left to predict: what the
-    // whole record moves by is the measure then.
-    // Blocks without a sample have no response.
+    // whole record moves by is the measure then. Blocks without a sample have no response.
     let forced = |rows: Range<usize>| -> f64 {
         let present = rows.filter(|row| whole.present(*row) > 0);
         variance(&present.map(|row| found.forced[row]).collect::<Vec<f64>>())
