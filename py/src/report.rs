@@ -174,10 +174,7 @@ fn rows<'py>(py: Python<'py>, identified: &Identified) -> Vec<Column<'py>> {
         ("measured", of.iter().map(|row| row.measured).collect()),
         ("simulated", of.iter().map(|row| row.simulated).collect()),
         ("predicted", of.iter().map(|row| row.predicted).collect()),
-        (
-            "innovation",
-            of.iter().map(|row| row.innovation).collect(),
-        ),
+        ("innovation", of.iter().map(|row| row.innovation).collect()),
         (
             "disturbance",
             of.iter().map(|row| row.disturbance).collect(),
