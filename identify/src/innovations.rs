@@ -152,8 +152,9 @@ impl Search<'_> {
         if prepared.part_used < 0.999 {
             self.remarks.push(Remark::PartUsed(prepared.part_used));
         }
-        let fitted = part(0.0..FITTED, || {
-            Fitted::new(&prepared, outliers, self.options, &mut self.remarks)
+        let fitted = part(0.0..FITTED, || match self.options.is_unstable {
+            true => Fitted::unstable(&prepared, outliers, self.options, &mut self.remarks),
+            false => Fitted::new(&prepared, outliers, self.options, &mut self.remarks),
         })?;
         let blocks = fitted.blocks();
         let components = part(FITTED..TESTED, || fitted.posterior(&blocks));
@@ -222,7 +223,7 @@ impl Search<'_> {
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
-        Self::judge_stability(blocks, fitted.best.found.theta.tau_s(), explained)?;
+        judge_stability(fitted, blocks, explained)?;
         let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
         let is_left = is_left_to_the_input(tests) && explained < 0.0;
         if is_left || is_another && explained < WELL_PREDICTED {
@@ -248,18 +249,6 @@ impl Search<'_> {
         }
     }
 
-    /// Refuses a process that is unstable without its controller: the reason why it is not predicted, or hardly. A random walk
-    /// may take what grows, and leaves clean innovations.
-    fn judge_stability(blocks: &Blocks<'_>, tau_s: f64, explained: f64) -> Result<(), Verdict> {
-        if explained >= WELL_PREDICTED || !validate::is_fed_back(blocks) {
-            return Ok(());
-        }
-        match unstable::growth_per_s(blocks, tau_s) {
-            Some(growth_per_s) => Err(Verdict::UnstableProcess { growth_per_s }),
-            None => Ok(()),
-        }
-    }
-
     /// Verdict if the record does not tell the gain, or if a bound of the search holds the fit.
     fn too_little(
         &self,
@@ -273,7 +262,7 @@ impl Search<'_> {
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
             return Some(self.no_information(theta, deviation));
         }
-        let bounds = Bounds::new(theta.structure, blocks, fitted.limits.longest_tau_s);
+        let bounds = Bounds::new(theta, blocks, fitted.limits.longest_tau_s);
         match result::at_bound(theta, &bounds)? {
             // A resonance without damping explains an oscillation that the input does not drive.
             Parameter::Zeta => Some(self.no_information(theta, None)),
@@ -403,6 +392,22 @@ impl Search<'_> {
             }),
             other => other,
         }
+    }
+}
+
+/// Refuses a process that is unstable without its controller: the reason why it is not predicted, or hardly. A random walk may take
+/// what grows, and leaves clean innovations.
+fn judge_stability(fitted: &Fitted, blocks: &Blocks<'_>, explained: f64) -> Result<(), Verdict> {
+    let theta = &fitted.best.found.theta;
+    if theta.grows || explained >= WELL_PREDICTED || !validate::is_fed_back(blocks) {
+        return Ok(());
+    }
+    let longest_tau_s = fitted.limits.longest_tau_s;
+    let growth_per_s = unstable::growth_per_s(blocks, theta.tau_s())
+        .or_else(|| unstable::explains_better(&fitted.record, theta, longest_tau_s));
+    match growth_per_s {
+        Some(growth_per_s) => Err(Verdict::UnstableProcess { growth_per_s }),
+        None => Ok(()),
     }
 }
 

@@ -117,7 +117,8 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
         return Identification::refused(verdict);
     }
     let mut found = innovations::identify(signals, options);
-    match steady {
+    // Who states that the process is unstable knows that a controller holds it, which may be a relay.
+    match steady.filter(|_| !options.is_unstable) {
         Some(Ok(oscillation)) if !settles(&used) => {
             found.steady = Some(oscillation);
             // Who states the structure knows the process: the remarks say what it leaves.

@@ -94,15 +94,19 @@ impl Draw {
         }
     }
 
-    /// Draw of the likelihood.
-    fn of_linear(drawn: &Drawn, reported: Structure) -> Self {
+    /// Draw of the likelihood, of an unstable process or of one that is not.
+    fn of_linear(drawn: &Drawn, (reported, is_unstable): (Structure, bool)) -> Self {
         let process = drawn.process;
         let [c1, c0] = process.pair();
+        let pole_per_s = match is_unstable {
+            true => process.pole_per_s().min(-f64::MIN_POSITIVE),
+            false => process.pole_per_s().max(0.0),
+        };
         let is_process =
-            process.tau_s() >= 0.0 && process.pole_per_s() >= 0.0 && c0 >= 0.0 && c1 >= 0.0;
+            process.tau_s() >= 0.0 && process.pole_per_s() == pole_per_s && c0 >= 0.0 && c1 >= 0.0;
         Self {
             process: process
-                .with_pole_per_s(process.pole_per_s().max(0.0))
+                .with_pole_per_s(pole_per_s)
                 .with_pair(c1.max(0.0), c0.max(0.0))
                 .with_tau_s(process.tau_s().max(0.0)),
             reported,
@@ -114,13 +118,13 @@ impl Draw {
     }
 
     /// The draw of a process that the estimator has found.
-    fn of_known(process: &Linear, reported: Structure, input_bias: f64) -> Self {
+    fn of_known(process: &Linear, kind: (Structure, bool), input_bias: f64) -> Self {
         let drawn = Drawn {
             process: *process,
             input_bias,
             has_complex_poles: false,
         };
-        Self::of_linear(&drawn, reported)
+        Self::of_linear(&drawn, kind)
     }
 
     /// Phase margin (rad) that a controller leaves on this draw. `None` if the loop has no margins.
@@ -224,6 +228,7 @@ impl Posterior {
         draw: impl Fn(usize, &[f64]) -> Drawn,
     ) -> Self {
         let structure = best.structure();
+        let kind = (structure, best.pole_per_s() < 0.0);
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
         let mut draws = Vec::with_capacity(DRAWS);
         let mut sum = 0.0;
@@ -236,7 +241,7 @@ impl Posterior {
                 let normal: [f64; 10] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
                 for side in [1.0, -1.0] {
                     let drawn = draw(component, &normal.map(|z| side * z));
-                    draws.push(Draw::of_linear(&drawn, structure));
+                    draws.push(Draw::of_linear(&drawn, kind));
                 }
             }
         }
@@ -250,7 +255,7 @@ impl Posterior {
         let draws = shuffled.collect();
         Self {
             structure,
-            best: Draw::of_known(best, structure, input_bias.unwrap_or(0.0)),
+            best: Draw::of_known(best, kind, input_bias.unwrap_or(0.0)),
             has_bias: input_bias.is_some(),
             draws,
             shortest: Shortest::default(),
@@ -260,15 +265,16 @@ impl Posterior {
     /// Posterior about `best` of which `draws` are known. The input bias is not estimated.
     pub(crate) fn of_draws(best: &Linear, draws: &[Linear]) -> Self {
         let structure = best.structure();
+        let kind = (structure, best.pole_per_s() < 0.0);
         // Neighbours of a chain are alike: every 617th in turn, a prime, so that the first few represent all.
         let count = draws.len();
         let shuffled = (0..count).map(|k| &draws[617 * k % count]);
         Self {
             structure,
-            best: Draw::of_known(best, structure, 0.0),
+            best: Draw::of_known(best, kind, 0.0),
             has_bias: false,
             draws: shuffled
-                .map(|draw| Draw::of_known(draw, structure, 0.0))
+                .map(|draw| Draw::of_known(draw, kind, 0.0))
                 .collect(),
             shortest: Shortest::default(),
         }

@@ -50,6 +50,8 @@ pub enum Remark {
     /// The recording does not show the damping: `T_body` and `K` have no upper bound. The value is the lower bound of
     /// `T_body` (s), if there is one.
     DampingNotSeen(Option<f64>),
+    /// The process is unstable without its controller. The value is the time constant with which its output grows (s).
+    Unstable(f64),
     /// Lags of the process cannot be told from equal ones.
     EqualLags {
         /// The lags, longest first.
@@ -235,6 +237,7 @@ impl Remark {
             Self::Unread => "unread",
             Self::NegativeGain => "negative_gain",
             Self::DampingNotSeen(_) => "damping_not_seen",
+            Self::Unstable(_) => "unstable",
             Self::EqualLags { .. } => "equal_lags",
             Self::Weak { .. } => "weak_parameter",
             Self::WeakDelay { .. } => "weak_delay",

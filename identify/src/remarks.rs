@@ -68,6 +68,11 @@ pub(crate) fn of_model(identified: &Identified, period_s: f64, remarks: &mut Vec
     {
         remarks.push(Remark::DampingNotSeen(t_body.low));
     }
+    if let Some(growth_s) = identified.model.parameter(Parameter::TBody)
+        && growth_s < 0.0
+    {
+        remarks.push(Remark::Unstable(-growth_s));
+    }
     if let Some((lags, mean_s)) = identified.posterior.equal_lags() {
         remarks.push(Remark::EqualLags { lags, mean_s });
     }

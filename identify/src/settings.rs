@@ -25,6 +25,9 @@ pub struct Options {
     pub method: Method,
     /// Structure to fit. `None`: the simplest one that explains the recording.
     pub structure: Option<Structure>,
+    /// Whether the process is known to be unstable without its controller: [`Structure::Foptd`] or [`Structure::Soptd`] with a negative
+    /// `T_body` is fitted. Otherwise a recording that shows such a process is refused.
+    pub is_unstable: bool,
     /// First and last time to use (s). `None`: from the start, to the end.
     pub span_s: (Option<f64>, Option<f64>),
     /// Input between two samples. `None`: the likelihood decides.
@@ -98,6 +101,15 @@ impl Options {
     #[must_use]
     pub fn structure(self, structure: Option<Structure>) -> Self {
         Self { structure, ..self }
+    }
+
+    /// Fits a process that is unstable without its controller.
+    #[must_use]
+    pub fn unstable(self, is_unstable: bool) -> Self {
+        Self {
+            is_unstable,
+            ..self
+        }
     }
 
     /// Uses the recording from the first to the second time (s) only.

@@ -115,11 +115,13 @@ pub enum Verdict {
     NotDriven,
     /// The model calls the loop unstable under the gains that were in force while it was recorded.
     UnstableInForce,
-    /// The process is unstable without the controller that ran: no structure has an unstable pole.
+    /// The process is unstable without the controller that ran. [`Options::unstable`](crate::Options::unstable) fits it.
     UnstableProcess {
         /// Rate (1/s) at which the output grows by itself.
         growth_per_s: f64,
     },
+    /// An unstable process was asked for, and no output grows by itself.
+    NothingGrows,
     /// The input follows the output: noise came back through the controller, and the set-point hardly moved the input.
     NotExcited {
         /// Share of the output's variance that the set-point explains.
@@ -172,7 +174,8 @@ impl Verdict {
             | Self::SetPointLeft { .. }
             | Self::NotDriven
             | Self::UnstableInForce
-            | Self::UnstableProcess { .. } => "not_this_process",
+            | Self::UnstableProcess { .. }
+            | Self::NothingGrows => "not_this_process",
             Self::NotExcited { .. } | Self::Calm { .. } | Self::OfController => "not_excited",
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
@@ -215,6 +218,7 @@ impl fmt::Display for Verdict {
             | Self::NotDriven
             | Self::UnstableInForce
             | Self::UnstableProcess { .. }
+            | Self::NothingGrows
             | Self::InputLeft { .. } => self.write_record(f),
             Self::NotExcited { .. }
             | Self::Calm { .. }
@@ -327,6 +331,9 @@ impl Verdict {
                 f,
                 "unstable without its controller: the output grows by itself with a time constant of {:.3} s",
                 1.0 / growth_per_s
+            ),
+            Self::NothingGrows => f.write_str(
+                "not this kind of process: nothing in the recording grows by itself, as an unstable process does",
             ),
             Self::SetPointLeft { ratio } => write!(
                 f,

@@ -105,6 +105,14 @@ impl<'a> Identify<'a> {
         }
     }
 
+    /// Fits a process that is known to be unstable without its controller. Default: a recording that shows one is refused.
+    pub fn unstable(self, is_unstable: bool) -> Self {
+        Self {
+            options: self.options.unstable(is_unstable),
+            ..self
+        }
+    }
+
     /// Takes the input between two samples as held or as interpolated. `None` (default): the likelihood decides.
     pub fn hold(self, hold: impl Into<Option<Hold>>) -> Self {
         Self {

@@ -250,6 +250,8 @@ pub struct Request {
     pub method: Method,
     /// Structure of the process. `None`: the simplest that explains the recording.
     pub structure: Option<Structure>,
+    /// Whether the process is known to be unstable without its controller.
+    pub is_unstable: bool,
     /// First time to use (s). `None`: the start; of a flight log that of the part that tells most.
     pub from_s: Option<f64>,
     /// Last time to use (s).
@@ -308,6 +310,8 @@ impl Request {
                 &mut self.structure,
                 Structure::from_name(value).ok_or("there is no such structure".to_owned()),
             ),
+            "unstable" => choice(value, &[("true", true), ("false", false)])
+                .map(|is_unstable| self.is_unstable = is_unstable),
             "from" => put(&mut self.from_s, values::time_s(value)),
             "to" => put(&mut self.to_s, values::time_s(value)),
             "hold" => put(&mut self.hold, choice(value, &values::HOLDS)),
@@ -371,6 +375,7 @@ impl Request {
             || self.from_s.is_some()
             || self.to_s.is_some()
             || self.structure.is_some()
+            || self.is_unstable
             || self.hold.is_some()
             || self.beta.is_some()
             || self.input_late_s.is_some()

@@ -236,6 +236,7 @@ impl Request {
             .method(self.method)
             .output_filter_hz(self.output_filter_hz)
             .span_s(self.from_s, self.to_s)
+            .unstable(self.is_unstable)
             .hold(self.hold)
             .beta(self.beta)
             .input_late_s(self.input_late_s)

@@ -20,7 +20,7 @@ pub mod verdict;
 use std::borrow::Cow;
 
 /// Names of the settings in sentences: those of a request, and what a program makes of a report.
-const SETTINGS: [&str; 46] = [
+const SETTINGS: [&str; 47] = [
     "against",
     "amplitude",
     "axis",
@@ -65,6 +65,7 @@ const SETTINGS: [&str; 46] = [
     "time",
     "time_unit",
     "to",
+    "unstable",
     "vendor",
     "write",
 ];

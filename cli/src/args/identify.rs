@@ -66,6 +66,10 @@ pub(crate) struct Identify {
     /// Structure of the process [default: the simplest that explains the recording]
     #[arg(long, help_heading = ESTIMATION, value_name = "NAME", value_parser = structure())]
     pub(crate) structure: Option<Structure>,
+    /// The process is known to be unstable without its controller, as a magnet that holds a ball or a pendulum on its head: a model
+    /// with one unstable pole is fitted
+    #[arg(long, help_heading = ESTIMATION)]
+    pub(crate) unstable: bool,
     /// Use the recording from this time, in seconds of its time column [default: its start]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
     pub(crate) from: Option<f64>,
@@ -143,6 +147,7 @@ impl Identify {
         request.cycles = self.cycles.map(|cycles| cycles as usize);
         request.method = self.method;
         request.structure = self.structure;
+        request.is_unstable = self.unstable;
         (request.from_s, request.to_s) = (self.from, self.to);
         request.hold = self.hold;
         request.beta = self.beta;

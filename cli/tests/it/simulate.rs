@@ -458,7 +458,9 @@ fn processes_with_wrong_parameters() {
         "not a parameter",
         "iptd",
     ]);
-    with("--process foptd --k 2 --t-body -30 --tau 5").misused(&["T_body", "positive", "-30"]);
+    with("--process foptd --k 2 --t-body 0 --tau 5").misused(&["T_body", "unstable", "0"]);
+    with("--process toiptd --k 2 --t-body -30 --t-prop 1 --t-prop2 1 --tau 5")
+        .misused(&["T_body", "positive", "-30"]);
     with("--process foptd --k 2 --t-body inf --tau 5").misused(&["K/T_body"]);
     with("--process resonant --k 2 --natural-frequency 0 --zeta 1 --tau 0")
         .misused(&["w0", "positive", "0"]);

@@ -23,6 +23,8 @@ pub(crate) struct OpenLoop {
     pub numerator: Polynomial,
     pub denominator: Polynomial,
     pub tau: f64,
+    /// Poles right of the imaginary axis.
+    pub unstable_poles: usize,
     resonance: Option<(f64, f64)>,
 }
 
@@ -33,6 +35,7 @@ impl OpenLoop {
             numerator,
             denominator: denominator.times(&process.denominator()),
             tau: process.tau,
+            unstable_poles: process.unstable_poles(),
             resonance: process.resonance(),
         }
     }

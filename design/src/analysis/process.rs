@@ -53,11 +53,12 @@ impl Stage {
         }
     }
 
-    /// Time constants, the longer one first. Infinite for an integrator, zero for a missing second one.
+    /// Time constants, the longer one first. Infinite for an integrator and for an unstable pole, which a loop must cross as fast as
+    /// an integrator; zero for a missing second one.
     pub(crate) fn times(self) -> [f64; 2] {
         match self {
             Self::Lag(lag) => [lag, 0.0],
-            Self::Pole(pole) => [1.0 / pole, 0.0],
+            Self::Pole(pole) => [1.0 / pole.max(0.0), 0.0],
             Self::Pair(c1, c0) if c1 * c1 > 4.0 * c0 => {
                 let larger = 0.5 * (c1 + (c1 * c1 - 4.0 * c0).sqrt());
                 [larger / c0, 1.0 / larger]
@@ -66,12 +67,13 @@ impl Stage {
         }
     }
 
-    /// Whether all poles lie left of the imaginary axis or in the origin.
-    fn is_stable(self) -> bool {
+    /// Number of poles right of the imaginary axis.
+    fn unstable_poles(self) -> usize {
         match self {
-            Self::Lag(lag) => lag > 0.0,
-            Self::Pole(pole) => pole >= 0.0,
-            Self::Pair(c1, c0) => c1 >= 0.0 && c0 >= 0.0,
+            Self::Lag(lag) => usize::from(lag <= 0.0),
+            Self::Pole(pole) => usize::from(pole < 0.0),
+            Self::Pair(_, c0) if c0 < 0.0 => 1,
+            Self::Pair(c1, _) => 2 * usize::from(c1 < 0.0),
         }
     }
 }
@@ -220,9 +222,15 @@ impl Process {
             .count()
     }
 
+    /// Number of poles right of the imaginary axis.
+    pub(crate) fn unstable_poles(&self) -> usize {
+        let poles = self.stages().iter().map(|stage| stage.unstable_poles());
+        poles.sum()
+    }
+
     /// Whether the process has no pole right of the imaginary axis.
     pub(crate) fn is_stable(&self) -> bool {
-        self.stages().iter().all(|stage| stage.is_stable())
+        self.unstable_poles() == 0
     }
 
     /// Time constants of stages and filters, the longest first; infinite for integrators.

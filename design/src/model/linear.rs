@@ -129,12 +129,19 @@ impl Linear {
             process.lags_s[1] = get(Parameter::TProp2, "a positive time", positive)?;
         }
         if stages.poles > 0 {
-            process.pole_per_s = if value(Parameter::InverseTBody).is_some() {
-                get(Parameter::InverseTBody, "zero or positive", |v| {
+            // Beside an integrator a negative time is a sign error rather than an unstable process.
+            let is_alone = stages.integrators == 0;
+            let of_inverse = value(Parameter::InverseTBody).is_some();
+            process.pole_per_s = match (of_inverse, is_alone) {
+                (true, true) => get(Parameter::InverseTBody, "finite", f64::is_finite)?,
+                (true, false) => get(Parameter::InverseTBody, "zero or positive", |v| {
                     v.is_finite() && v >= 0.0
-                })?
-            } else {
-                1.0 / get(Parameter::TBody, "a positive time", |v| v > 0.0)?
+                })?,
+                (false, true) => {
+                    let requirement = "a time, negative for an unstable process";
+                    1.0 / get(Parameter::TBody, requirement, |v| v != 0.0 && !v.is_nan())?
+                }
+                (false, false) => 1.0 / get(Parameter::TBody, "a positive time", |v| v > 0.0)?,
             };
         }
         let mut gain_of_k = process.pole_per_s;

@@ -6,7 +6,8 @@
 //!
 //! So a gain is allowed if it lies in no band, and if the turns of the bands that it exceeds sum to zero. With two
 //! integrators the first band begins at infinite gain: it turns if it leaves below the axis. Three integrators start with
-//! a turn of -1. Nothing else needs to be counted for a stable process.
+//! a turn of -1, and so does one behind an unstable pole: the plot starts with the same phase, -270 deg, and the large arc that
+//! closes it, shorter by one turn, is what the pole asks for. Nothing else needs to be counted.
 
 use num_complex::Complex64;
 
@@ -274,11 +275,12 @@ impl Scan<'_> {
         }
     }
 
-    /// Turns at frequency zero, by the integrators of the loop.
+    /// Turns at frequency zero, by the integrators and the unstable pole of the loop.
     fn first_turns(&self) -> i32 {
         let zeros = |c: &[f64]| c.iter().take_while(|c| **c == 0.0).count();
         let integrators = zeros(self.open_loop.denominator.coefficients());
-        -i32::from(integrators > 2 + zeros(self.open_loop.numerator.coefficients()))
+        let turning = integrators + 2 * self.open_loop.unstable_poles;
+        -i32::from(turning > 2 + zeros(self.open_loop.numerator.coefficients()))
     }
 
     /// Whether a gain just below the band `at` is allowed.

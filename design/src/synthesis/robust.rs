@@ -171,7 +171,7 @@ impl Draws {
         for draw in draws {
             let process = draw.in_unit(nominal.process.unit_s);
             let ratio = process.gain / nominal.process.gain;
-            if ratio > 0.0 && process.is_stable() {
+            if ratio > 0.0 && process.unstable_poles() == nominal.process.unstable_poles() {
                 objectives.push(Objective::new(Problem { process, ..nominal }, GRID));
                 ratios.push(ratio);
             }

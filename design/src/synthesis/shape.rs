@@ -172,14 +172,16 @@ impl Family {
 
     /// Variables to start a search from. A cascade with PID starts [from one with PI](Self::with_rate_derivative).
     pub(crate) fn starts(&self, process: &Process) -> Vec<Vec<f64>> {
-        let is_integrating = process.integrators() > 0;
+        // An unstable pole turns the phase as two integrators do.
+        let integrators = process.integrators() + 2 * process.unstable_poles();
+        let is_integrating = integrators > 0;
         // Dead time and the lags behind the two longest ones: the time scale of a fast loop.
         let fast = process.half_rule_dead_time(2);
         let mut integral_times = vec![0.25, 0.6, 1.2, 3.0];
         if is_integrating {
             integral_times.extend([6.0, 12.0]);
         }
-        let is_double = process.integrators() > 1;
+        let is_double = integrators > 1;
         if is_double {
             integral_times.extend([30.0, 100.0, 300.0, 1000.0]);
         }

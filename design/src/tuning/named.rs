@@ -217,10 +217,11 @@ pub(crate) fn problem(
     let form = specification.form;
     let execution = &specification.execution;
     let process = Process::new(&model.linear(), execution).ok_or(DesignError::Overflow)?;
-    if !process.is_stable() {
+    let is_integrating = process.integrators() > 0;
+    if process.unstable_poles() > usize::from(!is_integrating) {
         return Err(DesignError::UnstableProcess);
     }
-    if !form.has_integral() && process.integrators() == 0 {
+    if !form.has_integral() && !is_integrating {
         return Err(DesignError::NoIntegral(form));
     }
     let is_cascade = matches!(form, Form::CascadePi | Form::CascadePid);

@@ -59,9 +59,9 @@ pub enum DesignError {
         /// The range it must lie in.
         requirement: &'static str,
     },
-    /// The process is unstable without a controller.
+    /// The process has more than one unstable pole, or one and an integrator.
     #[error(
-        "the process has a pole in the right half-plane; controllers are designed for stable and integrating processes"
+        "the process has poles in the right half-plane; controllers are designed for one such pole without an integrator"
     )]
     UnstableProcess,
     /// The form has no integral term, so that a stable process would not reach the reference.

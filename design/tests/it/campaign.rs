@@ -7,7 +7,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use onecycle_design::{
-    Controller, DesignError, Form, Model, Specification, Structure, design, noise_amplification,
+    Controller, DesignError, Form, Model, Specification, Structure, Style, design,
+    noise_amplification,
 };
 
 use crate::random::Random;
@@ -37,7 +38,7 @@ fn nyquist(model: &Model, controller: &Controller) -> Nyquist {
     let times = [
         tau_s,
         linear.lags_s().iter().sum(),
-        stages.poles as f64 / linear.pole_per_s(),
+        stages.poles as f64 / linear.pole_per_s().abs(),
         linear.pair()[0] / linear.pair()[1] * stages.pairs as f64,
         1.0 / resonance,
         pid.kp / pid.ki,
@@ -85,10 +86,12 @@ fn integrators_of(model: &Model) -> usize {
     stages.integrators + usize::from(stages.poles > 0 && linear.pole_per_s() == 0.0)
 }
 
-/// Whether a controller keeps what was asked, to 1e-3. The plot of a stable loop turns by a quarter for each integrator.
+/// Whether a controller keeps what was asked, to 1e-3. The plot of a stable loop turns by a quarter for each integrator
+/// and by half for an unstable pole.
 fn verdict(model: &Model, asked: &Specification, controller: &Controller) -> &'static str {
     let found = nyquist(model, controller);
-    let turn_rad = integrators(model, asked.form) as f64 * FRAC_PI_2;
+    let unstable = usize::from(model.linear().pole_per_s() < 0.0);
+    let turn_rad = (integrators(model, asked.form) + 2 * unstable) as f64 * FRAC_PI_2;
     let noise = asked.noise.map_or(0.0, |noise| {
         let kappa = noise_amplification(model, controller, noise.sample_period_s);
         kappa.unwrap_or(f64::INFINITY) * noise.std / noise.input_amplitude
@@ -193,6 +196,73 @@ fn designs_of_a_hundred_thousand_processes() {
         std::env::var(name).map_or(default, |value| value.parse().unwrap())
     };
     check(number("FROM", 0)..number("TO", 100_000));
+}
+
+// Unstable processes with dead times up to what a controller can bear: a design is stable and keeps its limits. One that does not
+// exist at these limits does at the least that is reported.
+#[test]
+fn designs_of_unstable_processes() {
+    let mut designed = 0;
+    for case in 0..100 {
+        let mut random = Random::new(case);
+        let model = random.unstable_process();
+        let mut asked =
+            Specification::new([Form::Pi, Form::Pid][case as usize % 2], Style::Balanced);
+        (asked.ms, asked.mt) = (3.0, 3.0);
+        let found = match design(&model, &asked) {
+            Err(DesignError::Infeasible {
+                least_peak: Some(least),
+                ..
+            }) => {
+                (asked.ms, asked.mt) = (1.01 * least, 1.01 * least);
+                design(&model, &asked)
+            }
+            found => found,
+        };
+        let found = found.unwrap_or_else(|error| panic!("{case}: {error} of {model:?}"));
+        assert_eq!(
+            verdict(&model, &asked, &found.controller),
+            "designed",
+            "{case}"
+        );
+        designed += usize::from(asked.ms == 3.0);
+    }
+    assert!(designed > 50, "{designed}");
+}
+
+// No PI controller of a grid has lower peaks than the least that is reported of an unstable process, and one is as low.
+#[test]
+fn the_least_peak_of_an_unstable_process_is_that_of_a_grid() {
+    use onecycle_design::{Linear, Pid};
+    for tau_s in [0.2, 0.3] {
+        let model: Model = Linear::new(Structure::Foptd)
+            .with_gain(1.0)
+            .with_pole_per_s(-1.0)
+            .with_tau_s(tau_s)
+            .into();
+        let mut asked = Specification::new(Form::Pi, Style::Balanced);
+        (asked.ms, asked.mt) = (1.05, 1.05);
+        let Err(DesignError::Infeasible {
+            least_peak: Some(least),
+            ..
+        }) = design(&model, &asked)
+        else {
+            panic!("no PI keeps a peak of 1.05");
+        };
+        let mut lowest = f64::INFINITY;
+        for kp in (0..60).map(|k| 1.05 * 1.03_f64.powi(k)) {
+            for ti in (0..16).map(|k| 1.5_f64.powi(k)) {
+                let found = nyquist(&model, &Pid::new(kp, kp / ti, 0.0).into());
+                if (found.turn_rad - 3.0 * FRAC_PI_2).abs() < 0.1 {
+                    lowest = lowest.min(found.ms.max(found.mt));
+                }
+            }
+        }
+        assert!(
+            (lowest / least - 1.0).abs() < 0.02,
+            "{tau_s}: {lowest} {least}"
+        );
+    }
 }
 
 // An integrator behind a lag of 1/8,000 of the dead time, under a cascade with rate PID: the filter and not the lag tells

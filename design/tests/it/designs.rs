@@ -218,7 +218,8 @@ fn designs_that_do_not_exist_are_refused() {
     let immediate = of(Structure::Foptd).with_tau_s(0.0);
     assert_eq!(refused(immediate, Form::Pi), DesignError::Unbounded);
     assert_eq!(refused(immediate, Form::Pid), DesignError::Unbounded);
-    let unstable = of(Structure::Foptd).with_pole_per_s(-1.0);
+    // Beside an integrator, an unstable pole is one too many.
+    let unstable = of(Structure::Soiptd).with_pole_per_s(-1.0);
     assert_eq!(refused(unstable, Form::Pi), DesignError::UnstableProcess);
     let double = of(Structure::DoubleIntegratorLag);
     assert!(matches!(

@@ -51,6 +51,18 @@ impl Random {
             .into()
     }
 
+    /// Process with an unstable pole, at most one lag, and a dead time up to a fifth of the time in which it grows.
+    pub(crate) fn unstable_process(&mut self) -> Model {
+        let structure = self.one_of(&[Structure::Foptd, Structure::Soptd]);
+        let growth_s = self.decades(-3.0, 4.0);
+        Linear::new(structure)
+            .with_gain(self.one_of(&[1.0, -1.0]) * self.decades(-3.0, 3.0))
+            .with_lags_s([growth_s * self.decades(-2.5, -0.7), 1.0])
+            .with_pole_per_s(-1.0 / growth_s)
+            .with_tau_s(growth_s * self.decades(-2.5, -0.7))
+            .into()
+    }
+
     /// Any form and style; some with sampling, some with noise.
     pub(crate) fn specification(&mut self, model: &Model) -> Specification {
         let form = self.one_of(&Form::ALL);

@@ -56,6 +56,16 @@ pub(super) struct Choice {
 }
 
 impl Choice {
+    /// Of fits to rows of `samples` samples.
+    pub(super) fn of(all: Vec<Candidate>, samples: usize) -> Self {
+        let candidates = best_of_each(all);
+        Self {
+            all: candidates.clone(),
+            candidates,
+            samples,
+        }
+    }
+
     /// The simplest structure within [`EQUAL`] of the best; with damping, where damping shows.
     pub(super) fn chosen(&self) -> Option<&Candidate> {
         let best = self.candidates.first()?.bic;
@@ -165,7 +175,7 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
         let are_longer = limits.fewest_samples > 1;
         candidates.retain(|candidate| {
             let theta = &candidate.found.theta;
-            let bounds = Bounds::new(theta.structure, &blocks, tau_s);
+            let bounds = Bounds::new(theta, &blocks, tau_s);
             let is_hidden = has_hidden_lag(theta, record.dt_s)
                 || bounds.has_fastest_pair(theta)
                 || is_slower_than(theta, (blocks.length_s(), limits.slowest_s))

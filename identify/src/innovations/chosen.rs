@@ -270,7 +270,12 @@ pub(super) fn rows_for(record: &Record, theta: &Theta) -> (usize, f64) {
 
 /// Gain of the log-likelihood if the input runs straight from sample to sample, where that explains the record better.
 /// `None` otherwise, and if the input is piecewise constant or the user has said what it does.
-fn straight(record: &Record, choice: &Choice, limits: &Limits, options: &Options) -> Option<f64> {
+pub(super) fn straight(
+    record: &Record,
+    choice: &Choice,
+    limits: &Limits,
+    options: &Options,
+) -> Option<f64> {
     if options.hold.is_some() || record.keeps_its_input() {
         return None;
     }

@@ -15,6 +15,8 @@ use super::theta::{NoiseKind, Theta};
 use super::vectors::data;
 
 const SKIP_S: f64 = 0.1;
+/// Pole of an unstable process (1/s).
+const GROWS: f64 = -4.0;
 
 /// Lower triangular root of a covariance matrix.
 fn root(a: &[Vec<f64>]) -> Vec<Vec<f64>> {
@@ -89,6 +91,10 @@ fn brute_force<const N: usize>(record: &Record, theta: &Theta, samples: usize) -
         ..record.clone()
     };
     let g = sums(&model, &Blocks::new(&every, 1, 0.0), theta.tau_s());
+    // The unit of the flat prior: an unstable pole is mirrored.
+    let mirrored = StateSpace::<N>::new(&theta.mirrored().process(1.0));
+    let (_, of_prior) = covariance(&mirrored, &intensity, record);
+    let g_of_prior = sums(&mirrored, &Blocks::new(&every, 1, 0.0), theta.tau_s());
     // Rows: sums of the samples present in a block.
     let first = record.index_at(SKIP_S);
     let rows: Vec<Vec<usize>> = (0..(record.len() - first) / samples)
@@ -113,32 +119,35 @@ fn brute_force<const N: usize>(record: &Record, theta: &Theta, samples: usize) -
         .collect();
     let l = root(&s);
     let y = forward(&l, &summed(&record.output));
-    let columns: Vec<Vec<f64>> = [g]
-        .iter()
-        .chain(&states)
-        .map(|column| summed(column))
-        .collect();
+    let with = |g: Vec<f64>, states: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
+        let columns = std::iter::once(g).chain(states);
+        columns.map(|column| summed(&column)).collect()
+    };
+    let (columns, of_prior) = (with(g, states), with(g_of_prior, of_prior));
     let white: Vec<Vec<f64>> = columns.iter().map(|column| forward(&l, column)).collect();
     // Gram-Schmidt and not normal equations, whose rounding would be larger than the difference to be tested.
     let white = Orthogonal::new(&white).unwrap();
     let (residual, coefficients) = white.solve(&y);
     let freedom = (rows.len() - columns.len()) as f64;
     let variance = residual.iter().map(|v| v * v).sum::<f64>() / freedom;
-    let before = Orthogonal::new(&columns).unwrap().log_determinant();
+    let before = Orthogonal::new(&of_prior).unwrap().log_determinant();
     let determinants = log_determinant(&l) + 2.0 * (white.log_determinant() - before);
     let two_pi = std::f64::consts::TAU;
     let likelihood = -0.5 * (freedom * (two_pi * variance).ln() + freedom + determinants);
-    (likelihood, coefficients[0])
+    // The prior is one of the state at the first row, until which a mirrored pole decays and does not grow.
+    let pole = |theta: &Theta| theta.process(1.0).pole_per_s();
+    let until = (pole(&theta.mirrored()) - pole(theta)) * SKIP_S;
+    (likelihood + until, coefficients[0])
 }
 
-// Each structure, with each noise, with one and four samples a row, with and without absent samples: to 1e-6.
+// Each structure, stable or growing, with each noise, with one and four samples a row, with and without absent samples: to 1e-6.
 #[test]
 fn the_filter_gives_the_likelihood_of_the_full_covariance() {
     use Structure::{
         DoubleIntegratorLag, Foptd, IntegratorLag, Iptd, ResonantLag, Soiptd, Soptd, Toiptd,
     };
     let ln = f64::ln;
-    let cases: [(Structure, Vec<f64>); 8] = [
+    let cases: [(Structure, Vec<f64>); 10] = [
         (Iptd, vec![]),
         (Foptd, vec![3.0]),
         (IntegratorLag, vec![ln(0.05)]),
@@ -147,6 +156,8 @@ fn the_filter_gives_the_likelihood_of_the_full_covariance() {
         (Soiptd, vec![ln(0.05), 0.5]),
         (Toiptd, vec![ln(0.05), ln(0.02), 0.4]),
         (ResonantLag, vec![ln(0.05), 1.0, 30.0]),
+        (Foptd, vec![GROWS]),
+        (Soptd, vec![ln(0.05), GROWS]),
     ];
     for (structure, process) in cases {
         for noises in [
@@ -156,11 +167,15 @@ fn the_filter_gives_the_likelihood_of_the_full_covariance() {
             [0.0, 0.0, 5.0],
             [0.0; 3],
         ] {
-            // Without an integrator the walk of the output is a state of its own.
-            if noises[2] > 0.0 && structure.stages().integrators == 0 {
+            let grows = process.last() == Some(&GROWS);
+            // Without an integrator the walk of the output is a state of its own. Nothing that acts on the process keeps the
+            // filter of one that grows stable.
+            let is_left_out = noises[2] > 0.0 || grows && noises == [0.0; 3];
+            if is_left_out && structure.stages().integrators == 0 {
                 continue;
             }
             let mut theta = Theta::new(structure);
+            theta.grows = grows;
             theta.values[..process.len()].copy_from_slice(&process);
             theta.values[theta.layout().tau()] = 0.033;
             for (kind, frequency) in NoiseKind::ALL.into_iter().zip(noises) {

@@ -91,10 +91,10 @@ pub(super) fn has_real_lags(theta: &Theta) -> bool {
         .is_some_and(|(slow_s, _)| slow_s.is_finite())
 }
 
-/// The process that is reported: `as_lags` turns a second-order stage into two lags.
-pub(super) fn reported(process: &Linear, as_lags: bool) -> Linear {
-    let clamped = clamped(process);
-    if as_lags {
+/// The process that is reported for a fit like `theta`: a second-order stage with real poles is two lags.
+pub(super) fn reported(process: &Linear, theta: &Theta) -> Linear {
+    let clamped = clamped(process, theta);
+    if has_real_lags(theta) {
         with_lags(&clamped)
     } else {
         clamped
@@ -107,12 +107,16 @@ pub(super) fn process(theta: &Theta, gain: f64, early_s: f64) -> Linear {
     process.with_tau_s(process.tau_s() + early_s)
 }
 
-/// The nearest process without negative damping and negative dead time.
-pub(super) fn clamped(process: &Linear) -> Linear {
+/// The nearest process without negative dead time and, unless `theta` is that of an unstable one, without negative damping.
+pub(super) fn clamped(process: &Linear, theta: &Theta) -> Linear {
     let [c1, c0] = process.pair();
+    let pole_per_s = match theta.grows {
+        true => process.pole_per_s(),
+        false => process.pole_per_s().max(0.0),
+    };
     process
         .with_tau_s(process.tau_s().max(0.0))
-        .with_pole_per_s(process.pole_per_s().max(0.0))
+        .with_pole_per_s(pole_per_s)
         .with_pair(c1.max(0.0), c0.max(0.0))
 }
 
@@ -164,7 +168,8 @@ pub(super) fn posterior_of(
     };
     let bias = has_bias(&best.theta).then(|| disturbance(best) / best.at.gain - stamps.rest);
     let weights = if total > 0.0 { weights } else { vec![] };
-    let process = reported(&process(&best.theta, best.at.gain, stamps.early_s), as_lags);
+    let process = process(&best.theta, best.at.gain, stamps.early_s);
+    let process = reported(&process, &best.theta);
     (
         Posterior::of_mixture(&process, bias, &weights, draw).down_to(stamps.shortest()),
         widened,

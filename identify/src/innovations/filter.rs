@@ -113,11 +113,22 @@ pub(super) fn runs<const N: usize>(
 
 /// Innovations of `D` data columns over their standard deviations, a row for each block that has samples.
 /// `workspace` holds the rows.
+///
+/// The last column may be what the input does within each block only, with the state `within` that it leaves behind: the
+/// filter then carries on what it does later. Empty, if the column is the whole response.
 pub(super) fn of_data<'a, const N: usize, const D: usize>(
     runs: &[Run<N>],
     columns: [&[f64]; D],
+    within: &[[f64; N]],
     workspace: &'a mut Vec<f64>,
 ) -> &'a [[f64; D]] {
+    let left = |state: &mut [[f64; D]; N], block: usize| {
+        if let Some(within) = within.get(block) {
+            for i in 0..N {
+                state[i][D - 1] -= within[i];
+            }
+        }
+    };
     let with_samples = runs.iter().filter(|run| run.has_samples);
     let count: usize = with_samples.map(|run| run.blocks).sum();
     workspace.resize(count * D, 0.0);
@@ -127,9 +138,11 @@ pub(super) fn of_data<'a, const N: usize, const D: usize>(
     let mut first = 0;
     for run in runs {
         let data = columns.map(|column| &column[first..first + run.blocks]);
+        let begin = first;
         first += run.blocks;
         if !run.has_samples {
             state = run.moved(&state, &[0.0; D]);
+            left(&mut state, begin);
             continue;
         }
         let (own, after) = rest.split_at_mut(run.blocks);
@@ -143,6 +156,7 @@ pub(super) fn of_data<'a, const N: usize, const D: usize>(
                 }
             }
             state = run.moved(&state, &z);
+            left(&mut state, begin + block);
             *row = innovation;
         }
     }

@@ -5,13 +5,13 @@ use std::ops::Range;
 use onecycle_design::{LowPass, Structure};
 
 use super::choose::{Choice, Limits, NEARLY};
-use super::chosen::{choose_on_parts, choose_start, rows_for};
+use super::chosen::{choose_on_parts, choose_start, rows_for, straight};
 use super::mixture::{self, Component};
 use super::prepare::Prepared;
-use super::record::{Blocks, Record};
+use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, Theta};
-use super::{LONGEST_TAU, forces, outliers, output_error, validate};
+use super::{LONGEST_TAU, forces, outliers, output_error, unstable, validate};
 use crate::assumed::RecordedLoop;
 use crate::outcome::Prediction;
 use crate::progress;
@@ -143,6 +143,50 @@ impl Fitted {
         Ok(fitted)
     }
 
+    /// Steps 2 and 3 for a process that is known to be unstable without its controller.
+    pub(super) fn unstable(
+        prepared: &Prepared,
+        outliers: usize,
+        options: &Options,
+        remarks: &mut Vec<Remark>,
+    ) -> Result<Self, Verdict> {
+        let mut record = Record {
+            // It is not at rest anywhere.
+            rest: None,
+            ..prepared.record.clone()
+        };
+        let chosen = |record: &Record| {
+            let found = unstable::choose(record, options.structure);
+            found.ok_or(Verdict::NothingGrows)
+        };
+        let (mut limits, mut choice) = chosen(&record)?;
+        if record.hold == Hold::Held
+            && let Some(gain) = straight(&record, &choice, &limits, options)
+        {
+            record.hold = Hold::Interpolated;
+            remarks.push(Remark::Interpolated(gain));
+            (limits, choice) = chosen(&record)?;
+        }
+        let samples = choice.samples;
+        let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+        let fit = refine(&mut record, &theta, &limits, samples);
+        let (best, found) = fit.ok_or(Verdict::NoFit)?;
+        let mut fitted = Self {
+            part: 0..record.len(),
+            choice,
+            limits,
+            samples,
+            wider: best.clone(),
+            best,
+            disturbances: Disturbances::Kept,
+            prediction: None,
+            outliers: outliers + found,
+            record,
+        };
+        fitted.prediction = fitted.prediction_by(&fitted.best.found.theta);
+        Ok(fitted)
+    }
+
     pub(super) fn blocks(&self) -> Blocks<'_> {
         Blocks::new(&self.record, self.samples, self.limits.skip_s)
     }
@@ -167,6 +211,11 @@ impl Fitted {
     fn prediction_by(&self, theta: &Theta) -> Option<Prediction> {
         let blocks = self.blocks();
         let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
+        // An unstable process is not predicted beyond the time in which it grows.
+        let horizon_s = match theta.grows {
+            true => horizon_s.min(-1.0 / theta.process(1.0).pole_per_s()),
+            false => horizon_s,
+        };
         validate::prediction(&self.record, theta, &self.limits, self.samples, horizon_s)
     }
 
@@ -200,14 +249,13 @@ impl Fitted {
 
     /// Step 4: components of the posterior.
     pub(super) fn posterior(&self, blocks: &Blocks<'_>) -> Vec<Component> {
-        let structure = self.wider.structure();
-        let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
+        let bounds = Bounds::new(&self.wider.found.theta, blocks, self.limits.longest_tau_s);
         let with = || mixture::mixture(blocks, &self.wider.found, &bounds);
         if self.disturbances == Disturbances::Kept {
             return with();
         }
         let found = &self.best.found;
-        let bounds = Bounds::new(found.theta.structure, blocks, self.limits.longest_tau_s);
+        let bounds = Bounds::new(&found.theta, blocks, self.limits.longest_tau_s);
         let without = mixture::of_one(blocks, found, &bounds);
         if self.disturbances == Disturbances::Refuted {
             return without.into_iter().collect();

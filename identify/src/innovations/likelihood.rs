@@ -21,6 +21,10 @@
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
 //! (1988); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973).
 //!
+//! The response of an unstable process, and what its initial state explains, grow without end; their innovations do not. So the
+//! filter gets what the input does within each block, and carries on by its own, which is stable, what the input does later.
+//! In `X0`, which only says in which unit the prior is flat, the pole is mirrored.
+//!
 //! Nonlinear forces of the record add a column each, behind `g`: their coefficients are further linear unknowns.
 //!
 //! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `D` data columns `y`, `g` and up to two of nonlinear
@@ -161,10 +165,10 @@ fn input_innovations_sized<const N: usize>(blocks: &Blocks<'_>, theta: &Theta) -
     let system = System::<N>::new(theta, blocks.record.dt_s);
     let lifted = system.lifted(blocks);
     let start = system.start_of(blocks, theta);
-    let response = response::sums(&system.model, blocks, theta.tau_s());
+    let (response, within) = response::of_input(&system.model, blocks, theta);
     let (runs, _) = runs(system.start(blocks, &lifted)?, &lifted, blocks);
     let mut workspace = vec![];
-    let rows = filter::of_data::<N, 1>(&runs, [&response], &mut workspace);
+    let rows = filter::of_data::<N, 1>(&runs, [&response], &within, &mut workspace);
     let filtered: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     let of_start = filter::of_start(&runs, &start.basis, start.count);
     let columns = start_columns(&of_start, start.count, filtered.len());
@@ -191,6 +195,9 @@ pub(super) struct Memory {
     key: Option<(Theta, bool)>,
     /// `g`, then the response to each nonlinear force, summed over the samples present in each block.
     responses: Vec<Vec<f64>>,
+    /// Of an unstable process, whose `g` is only what the input does within each block: the states that it leaves behind, one after
+    /// the other.
+    within: Vec<f64>,
     /// `ln|X0'X0| / 2`.
     log_determinant: f64,
     /// Innovations of the data columns over their standard deviations, row by row.
@@ -233,7 +240,8 @@ fn filtered<const N: usize, const D: usize>(
         None => &blocks.sums[..],
         Some(response) => &memory.responses[response][..],
     });
-    let rows = filter::of_data::<N, D>(runs, columns, &mut memory.rows);
+    let (within, _) = memory.within.as_chunks::<N>();
+    let rows = filter::of_data::<N, D>(runs, columns, within, &mut memory.rows);
     let responses = D - 1;
     let count = rows.len();
     let freedom = count as f64 - (responses + start.count) as f64;
@@ -379,6 +387,18 @@ fn remember<const N: usize>(
         return Some(());
     }
     memory.key = None;
+    memory.within.clear();
+    if theta.grows {
+        let mirrored = theta.mirrored();
+        let of_mirrored = System::<N>::new(&mirrored, blocks.record.dt_s);
+        let lifted = of_mirrored.lifted(blocks);
+        remember(&of_mirrored, &lifted, blocks, (&mirrored, start), memory)?;
+        let (sums, states) = response::of_input(&system.model, blocks, theta);
+        memory.responses = vec![sums];
+        memory.within = states.concat();
+        memory.key = Some(key);
+        return Some(());
+    }
     memory.responses = vec![response::sums(&system.model, blocks, theta.tau_s())];
     let forces = response::of_forces(&system.model, blocks, theta.delay_and_lag_s());
     memory.responses.extend(forces);

@@ -88,7 +88,7 @@ fn explains_more(
         .start
         .left(&before.less_response(y, with.at.gain / blocks.scale));
     let share = 1.0 - left / kept;
-    let bounds = Bounds::new(quiet.structure, blocks, longest_tau_s);
+    let bounds = Bounds::new(&quiet, blocks, longest_tau_s);
     let all = before.with_slopes(blocks, &quiet, with.at.gain / blocks.scale, &bounds)?;
     let deviation = with.at.variance.sqrt() / blocks.scale;
     let reaches = |disturbance: &[f64]| {

@@ -58,7 +58,7 @@ pub fn expected(
         .min((fast_s / sample_s) as usize)
         .max(1);
     let blocks = Blocks::new(&record, samples, skip_s);
-    let bounds = Bounds::new(theta.structure, &blocks, longest.max(2.0 * theta.tau_s()));
+    let bounds = Bounds::new(&theta, &blocks, longest.max(2.0 * theta.tau_s()));
     let mut at = evaluate(&blocks, &theta, &mut Memory::default())?;
     at.variance = noise.sigma * noise.sigma;
     let found = Found { theta, at };

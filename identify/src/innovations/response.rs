@@ -16,6 +16,7 @@ use onecycle_design::{Linear, Structure};
 
 use super::lifted::{dot, row_times};
 use super::record::{BlockKind, Blocks, Hold, Record};
+use super::theta::Theta;
 
 /// Values at the samples of a record that act on a process.
 #[derive(Clone, Copy)]
@@ -56,6 +57,24 @@ pub(super) fn sums<const N: usize>(
 ) -> Vec<f64> {
     with_input(blocks.record, tau_s, |source| {
         sums_of(model, blocks, source)
+    })
+}
+
+/// Response of a process to its input of unit gain: as [`sums`], and no states. Of one that grows, what the input does within each
+/// block, from a state of zero at its start: the sum over the samples present, and the state at its end. On an even grid.
+pub(super) fn of_input<const N: usize>(
+    model: &StateSpace<N>,
+    blocks: &Blocks<'_>,
+    theta: &Theta,
+) -> (Vec<f64>, Vec<[f64; N]>) {
+    if !theta.grows {
+        return (sums(model, blocks, theta.tau_s()), vec![]);
+    }
+    with_input(blocks.record, theta.tau_s(), |source| {
+        let mut walk = Walk::new(model, blocks, source);
+        (0..blocks.len())
+            .map(|block| walk.over(block, &[0.0; N]))
+            .unzip()
     })
 }
 
@@ -266,43 +285,94 @@ fn delayed<'a>(
     copy
 }
 
+/// From block to block of an even grid.
+struct Walk<'a, const N: usize> {
+    blocks: &'a Blocks<'a>,
+    source: Source<'a>,
+    output: usize,
+    injection: Injection<N>,
+    weights: Weights<N>,
+    /// Whether a kind of block has all samples.
+    full: Vec<bool>,
+    copy: Vec<f64>,
+}
+
+impl<'a, const N: usize> Walk<'a, N> {
+    fn new(model: &StateSpace<N>, blocks: &'a Blocks<'a>, source: Source<'a>) -> Self {
+        let injection = Injection::new(model, blocks.record.dt_s, source);
+        let is_full = |kind: &BlockKind| kind.mask.iter().all(|present| *present);
+        Self {
+            blocks,
+            source,
+            output: model.output,
+            weights: Weights::new(&injection, model.output, blocks.samples),
+            injection,
+            full: blocks.kinds.iter().map(is_full).collect(),
+            copy: Vec::new(),
+        }
+    }
+
+    /// Sum of `count` samples from `start` on, and the state after them.
+    fn advance(&mut self, state: &[f64; N], (start, count): (usize, usize)) -> (f64, [f64; N]) {
+        let delay = self.injection.delay;
+        let inputs = delayed(self.source, delay, (start, count), &mut self.copy);
+        match count == self.blocks.samples {
+            true => self.weights.advance(state, inputs),
+            false => (state[self.output], self.injection.advance(state, inputs)),
+        }
+    }
+
+    /// State at the first block, from rest at the first sample.
+    fn at_first(&mut self) -> [f64; N] {
+        let samples = self.blocks.samples;
+        let mut state = [0.0; N];
+        let single = self.blocks.first % samples;
+        for sample in 0..single {
+            (_, state) = self.advance(&state, (sample, 1));
+        }
+        for start in (single..self.blocks.first).step_by(samples) {
+            (_, state) = self.advance(&state, (start, samples));
+        }
+        state
+    }
+
+    /// Sum over the samples present in a block, and the state after it.
+    fn over(&mut self, block: usize, state: &[f64; N]) -> (f64, [f64; N]) {
+        let start = self.blocks.range(block).start;
+        let kind = self.blocks.kind_of[block] as usize;
+        if self.full[kind] {
+            return self.advance(state, (start, self.blocks.samples));
+        }
+        let (mut sum, mut state) = (0.0, *state);
+        let blocks = self.blocks;
+        for (sample, present) in (start..).zip(&blocks.kinds[kind].mask) {
+            if *present {
+                sum += state[self.output];
+            }
+            let inputs = delayed(
+                self.source,
+                self.injection.delay,
+                (sample, 1),
+                &mut self.copy,
+            );
+            state = self.injection.advance(&state, inputs);
+        }
+        (sum, state)
+    }
+}
+
 /// Samples on an even grid, block by block.
 fn even<const N: usize>(
     model: &StateSpace<N>,
     blocks: &Blocks<'_>,
     source: Source<'_>,
 ) -> Vec<f64> {
-    let samples = blocks.samples;
-    let injection = Injection::new(model, blocks.record.dt_s, source);
-    let delay = injection.delay;
-    let weights = Weights::new(&injection, model.output, samples);
-    let mut copy = Vec::new();
-    let mut state = [0.0; N];
-    let single = blocks.first % samples;
-    for sample in 0..single {
-        state = injection.advance(&state, delayed(source, delay, (sample, 1), &mut copy));
-    }
-    for start in (single..blocks.first).step_by(samples) {
-        let inputs = delayed(source, delay, (start, samples), &mut copy);
-        (_, state) = weights.advance(&state, inputs);
-    }
-    let is_full = |kind: &BlockKind| kind.mask.iter().all(|present| *present);
-    let full: Vec<bool> = blocks.kinds.iter().map(is_full).collect();
+    let mut walk = Walk::new(model, blocks, source);
+    let mut state = walk.at_first();
     let mut sums = Vec::with_capacity(blocks.len());
-    for (block, &kind) in blocks.kind_of.iter().enumerate() {
-        let start = blocks.range(block).start;
-        let mut sum = 0.0;
-        if full[kind as usize] {
-            let inputs = delayed(source, delay, (start, samples), &mut copy);
-            (sum, state) = weights.advance(&state, inputs);
-        } else {
-            for (sample, present) in (start..).zip(&blocks.kinds[kind as usize].mask) {
-                if *present {
-                    sum += state[model.output];
-                }
-                state = injection.advance(&state, delayed(source, delay, (sample, 1), &mut copy));
-            }
-        }
+    for block in 0..blocks.len() {
+        let (sum, next) = walk.over(block, &state);
+        state = next;
         sums.push(sum);
     }
     sums

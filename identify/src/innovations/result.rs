@@ -4,7 +4,7 @@ use onecycle_design::{Model, Parameter, Structure};
 
 use super::choose::HOPELESS;
 use super::descent::Found;
-use super::draws::{clamped, has_real_lags, process, reported};
+use super::draws::{clamped, process, reported};
 use super::fitted::Fitted;
 use super::forces;
 use super::prediction::{Filtering, predict};
@@ -49,7 +49,7 @@ pub(super) fn at_bound(theta: &Theta, bounds: &Bounds) -> Option<Parameter> {
 /// The most probable model. The recorded output stands `early_s` after its time stamps.
 pub(super) fn model(found: &Found, early_s: f64) -> Model {
     let process = process(&found.theta, found.at.gain, early_s);
-    Model::from(reported(&process, has_real_lags(&found.theta)))
+    Model::from(reported(&process, &found.theta))
 }
 
 fn noise_of(candidate: &Candidate) -> Noise {
@@ -94,11 +94,10 @@ pub(super) fn innovations(
     }
     let alternatives = (fitted.choice.within(HOPELESS))
         .map(|candidate| Alternative {
-            model: Model::from(clamped(&process(
+            model: Model::from(clamped(
+                &process(&candidate.found.theta, candidate.found.at.gain, 0.0),
                 &candidate.found.theta,
-                candidate.found.at.gain,
-                0.0,
-            ))),
+            )),
             noise: noise_of(candidate),
             bic: candidate.bic,
         })

@@ -218,7 +218,7 @@ fn screen_at(
     if blocks.len() < 30 {
         return vec![];
     }
-    let bounds = Bounds::new(structure, &blocks, longest_tau_s);
+    let bounds = Bounds::new(&Theta::new(structure), &blocks, longest_tau_s);
     let length = blocks.length_s();
     let with = |theta: Theta, kind, of: &'static [f64]| {
         of.iter()
@@ -362,7 +362,7 @@ fn fit_within(
     longest_tau_s: f64,
     patience: Patience,
 ) -> Option<Candidate> {
-    let bounds = Bounds::new(start.structure, blocks, longest_tau_s);
+    let bounds = Bounds::new(start, blocks, longest_tau_s);
     let free = start.free();
     let found = descend(blocks, start, &free, &bounds, patience)?;
     let mut found = match ordered(&found.theta) {
@@ -443,7 +443,7 @@ pub(super) fn ranked(
     let mut memory = Memory::default();
     let mut found: Vec<(f64, Theta)> = (thetas.into_iter())
         .filter_map(|theta| {
-            let theta = Bounds::new(theta.structure, blocks, longest_tau_s).clamp(&theta);
+            let theta = Bounds::new(&theta, blocks, longest_tau_s).clamp(&theta);
             Some((cost(&theta, &evaluate(blocks, &theta, &mut memory)?), theta))
         })
         .collect();
@@ -590,6 +590,6 @@ pub(super) fn warm(
     longest_tau_s: f64,
     patience: Patience,
 ) -> Option<Found> {
-    let bounds = Bounds::new(theta.structure, blocks, longest_tau_s);
+    let bounds = Bounds::new(theta, blocks, longest_tau_s);
     descend(blocks, theta, &theta.free(), &bounds, patience)
 }

@@ -28,6 +28,7 @@ pub(super) struct System<const N: usize> {
     pub(super) c: [f64; N],
     /// Intensities of the noises over the variance of the white noise of a sample.
     intensity: Matrix<N>,
+    grows: bool,
 }
 
 impl<const N: usize> System<N> {
@@ -64,6 +65,7 @@ impl<const N: usize> System<N> {
             model,
             c,
             intensity,
+            grows: theta.grows,
         }
     }
 
@@ -109,9 +111,11 @@ impl<const N: usize> System<N> {
     }
 
     /// Covariance that the filter starts from: the steady one of the first kind of block without absent samples.
+    ///
+    /// Of an unstable process no start without a disturbance gives a stable filter.
     pub(super) fn start(&self, blocks: &Blocks<'_>, lifted: &[Lifted<N>]) -> Option<Matrix<N>> {
         if self.is_quiet() {
-            return Some([[0.0; N]; N]);
+            return (!self.grows).then_some([[0.0; N]; N]);
         }
         let is_full = |kind: usize| blocks.kinds[kind].mask.iter().all(|present| *present);
         let full = (0..lifted.len()).find(|&kind| is_full(kind) && lifted[kind].r > 0.0);

@@ -3,7 +3,7 @@
 //! | unknown | coordinate | why |
 //! |---------|------------|-----|
 //! | actuator lag `T` (s) | `ln T` | positive |
-//! | pole `a = 1/T_body` (1/s) | `a` | no damping, `a = 0`, is an ordinary point |
+//! | pole `a = 1/T_body` (1/s) | `a` | no damping, `a = 0`, is an ordinary point; negative for sure of an unstable process |
 //! | `c1` (1/s), `c0` (1/s^2) of the second-order stage | as they are | `c0 = 0` is an integrator with a lag |
 //! | dead time `tau` (s) | `tau` | no dead time is an ordinary point |
 //! | noise `w1`, `w0`, `wy` (rad/s) | `ln w` | positive; minus infinity without this noise |
@@ -27,6 +27,8 @@ pub(super) const MOST: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Theta {
     pub(super) structure: Structure,
+    /// Whether the pole is that of an unstable process, which grows by more than [`GROWTH`] powers of e over the record.
+    pub(super) grows: bool,
     pub(super) values: [f64; MOST],
 }
 
@@ -80,9 +82,19 @@ impl Theta {
     pub(super) fn new(structure: Structure) -> Self {
         let theta = Self {
             structure,
+            grows: false,
             values: [0.0; MOST],
         };
         theta.without_noises()
+    }
+
+    /// The process with its unstable pole on the other side of the imaginary axis: as strong at every frequency.
+    pub(super) fn mirrored(mut self) -> Self {
+        if let Some(pole) = self.layout().pole() {
+            self.values[pole] = self.values[pole].abs();
+        }
+        self.grows = false;
+        self
     }
 
     pub(super) fn layout(&self) -> Layout {
@@ -206,6 +218,9 @@ impl Theta {
 pub(super) const LAGS_IN_A_SAMPLE: f64 = 20.0;
 pub(super) const BODIES_IN_A_SAMPLE: f64 = 2.0;
 
+/// Powers of e by which a process that is not taken for unstable may grow over the record: no damping is then no bound.
+pub(super) const GROWTH: f64 = 3.0;
+
 /// Box that holds the unknowns, and steps for differences.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
@@ -216,15 +231,13 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Bounds for a record: lags from a twentieth of a sample to its length, a pole that may be a little unstable (so
-    /// that no damping is not on the boundary), a dead time that may be a little negative, noise frequencies from
-    /// 0.03 over its length to ten over the sample period.
-    pub(super) fn new(structure: Structure, blocks: &Blocks<'_>, longest_tau_s: f64) -> Self {
+    /// Bounds for a record and a process like `theta`: lags from a twentieth of a sample to its length, a pole that may be a
+    /// little unstable (so that no damping is not on the boundary) or is more than that, a dead time that may be a little
+    /// negative, noise frequencies from 0.03 over its length to ten over the sample period.
+    pub(super) fn new(theta: &Theta, blocks: &Blocks<'_>, longest_tau_s: f64) -> Self {
         let (dt, length) = (blocks.record.dt_s, blocks.length_s());
         let block = blocks.block_s();
-        let layout = Layout {
-            stages: structure.stages(),
-        };
+        let layout = theta.layout();
         let mut bounds = Self {
             low: [f64::NEG_INFINITY; MOST],
             high: [f64::INFINITY; MOST],
@@ -239,10 +252,15 @@ impl Bounds {
             set(lag, (dt / LAGS_IN_A_SAMPLE).ln(), length.ln(), 1e-5);
         }
         if let Some(pole) = layout.pole() {
-            set(pole, -3.0 / length, BODIES_IN_A_SAMPLE / dt, 1e-4 / length);
+            let (least, fastest) = (-GROWTH / length, BODIES_IN_A_SAMPLE / dt);
+            let (low, high) = match theta.grows {
+                true => (-fastest, least),
+                false => (least, fastest),
+            };
+            set(pole, low, high, 1e-4 / length);
         }
         if let Some(pair) = layout.pair() {
-            set(pair, -3.0 / length, 4.0 / dt, 1e-4 / length);
+            set(pair, -GROWTH / length, 4.0 / dt, 1e-4 / length);
             let (low, high) = (-9.0 / (length * length), 4.0 / (dt * dt));
             set(pair + 1, low, high, 1e-4 / (length * length));
         }

@@ -468,7 +468,7 @@ fn best_points_with_their_covariance() {
         let blocks = Blocks::new(&record, samples, 0.1);
         let mut start = theta(Structure::Soiptd, &[0.05_f64.ln(), 0.5, 0.05], 0.0, 0.0);
         start.set_noise(kind, 2.0);
-        let bounds = Bounds::new(Structure::Soiptd, &blocks, 0.3);
+        let bounds = Bounds::new(&Theta::new(Structure::Soiptd), &blocks, 0.3);
         let patience = Patience {
             steps: 100,
             decrease: 1e-13,

@@ -101,7 +101,9 @@ impl Estimate {
         };
         self.get(parameter).is_some_and(|interval| {
             let is_at_bound = |low: f64| low <= bound * (1.0 + 1e-9);
-            interval.low.is_some_and(is_at_bound) && interval.high.is_some()
+            // The time of an unstable process is negative.
+            let is_positive = |high: f64| high >= 0.0;
+            interval.low.is_some_and(is_at_bound) && interval.high.is_some_and(is_positive)
         })
     }
 

@@ -12,3 +12,4 @@ mod lags;
 mod names;
 mod outcomes;
 mod steps;
+mod unstable;

@@ -96,6 +96,7 @@ fn remarks_have_a_stable_unique_name() {
         (Remark::Unread, "unread"),
         (Remark::NegativeGain, "negative_gain"),
         (Remark::DampingNotSeen(None), "damping_not_seen"),
+        (Remark::Unstable(1.0), "unstable"),
         (
             Remark::EqualLags {
                 lags: vec![Parameter::TBody, Parameter::TProp],

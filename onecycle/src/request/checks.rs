@@ -10,12 +10,19 @@ use crate::source::Source;
 impl Request {
     /// Refuses settings that a fit to the cycles of a relay test does not have.
     pub(super) fn check_estimator(&self) -> Result<(), Error> {
+        let has_one_pole = |structure| matches!(structure, Structure::Foptd | Structure::Soptd);
+        if self.is_unstable && !self.structure.is_none_or(has_one_pole) {
+            return Err(Error::request(
+                "`unstable` is for the structures foptd and soptd: leave out `structure`, or choose one of them",
+            ));
+        }
         let is_other = |structure| structure != Structure::Soiptd;
         let refused = [
             ("structure", self.structure.is_some_and(is_other)),
             ("from", self.from_s.is_some()),
             ("to", self.to_s.is_some()),
             ("hold=interpolated", self.hold == Some(Hold::Interpolated)),
+            ("unstable", self.is_unstable),
         ];
         match given(&refused).filter(|_| self.of_cycles().is_some()) {
             Some(setting) => Err(Error::Request(format!(

@@ -65,7 +65,7 @@ pub fn advice(error: &DesignError) -> String {
         DesignError::Structure(_) => {
             "Choose `style=sharp`, balanced or calm; `style=paper` is for the structure soiptd only".to_owned()
         }
-        DesignError::UnstableProcess => "Stabilise the process first and identify the loop".to_owned(),
+        DesignError::UnstableProcess => "Stabilise the process by an inner loop and identify that".to_owned(),
         _ => "Write the process in other units".to_owned(),
     }
 }

@@ -300,6 +300,11 @@ fn of_result(remark: &Remark) -> Option<String> {
                  K/T_body, which is known."
             )
         }
+        Remark::Unstable(growth_s) => format!(
+            "Without its controller the output grows by itself, with a time constant of {}: its time constant is negative. Do not \
+             switch the controller off, and change its gains in small steps.",
+            seconds(growth_s)
+        ),
         Remark::EqualLags { ref lags, mean_s } => equal_lags(lags, mean_s),
         Remark::WeakDelay { low_s, high_s } if low_s <= 0.0 => {
             format!("The delay is only known to be below {}.", seconds(high_s))

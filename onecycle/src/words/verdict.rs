@@ -23,6 +23,7 @@ pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
         | Verdict::NotDriven
         | Verdict::UnstableInForce
         | Verdict::UnstableProcess { .. }
+        | Verdict::NothingGrows
         | Verdict::InputLeft { .. } => of_record(verdict).into(),
         Verdict::SetPointLeft { .. } => of_record(verdict).into(),
         Verdict::OutputLeads { .. } | Verdict::OfController => of_record(verdict).into(),
@@ -123,8 +124,12 @@ fn of_record(verdict: &Verdict) -> &'static str {
             "Fly quick manoeuvres or a chirp on this axis: noise that goes round the loop can pass for a process."
         }
         Verdict::UnstableProcess { .. } => {
-            "No structure of this program has an unstable pole: keep the controller that runs, and design for this process \
-             by other means."
+            "If you know that it is, as of a magnet that holds a ball, `unstable` fits a model with an unstable pole; keep the \
+             controller that runs. If it is not, look for a second input, or a drift that the controller follows."
+        }
+        Verdict::NothingGrows => {
+            "Leave `unstable` out; if the process is unstable, record at least 300 rows in closed loop, at even times and with quick \
+             moves of the set-point."
         }
         Verdict::NoPrediction { .. } => {
             "Use a part of the recording in which the process stays the same, with `from` and `to`, and look for a \
@@ -288,6 +293,7 @@ mod tests {
             Verdict::OutputLeads { share: 0.3 },
             Verdict::OfController,
             Verdict::UnstableProcess { growth_per_s: 56.0 },
+            Verdict::NothingGrows,
             Verdict::NoController(DesignError::Structure(crate::Structure::Foptd)),
             Verdict::NoController(DesignError::PhaseMargin(2.0)),
         ];

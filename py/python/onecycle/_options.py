@@ -110,6 +110,8 @@ class EstimateOptions(PartOptions, ControllerOptions, total=False):
     """Largest noise at the actuator, as a share of the input's amplitude."""
     structure: Structure
     """Structure of the process; else the simplest that explains the recording."""
+    unstable: bool
+    """The process is known to be unstable without its controller: a model with one unstable pole is fitted."""
     hold: Literal["held", "interpolated"]
     """Input between two samples; else the likelihood decides."""
     input_late: float
