@@ -1,6 +1,6 @@
 //! `simulate` with processes, test signals, loops and disturbances beyond the relay test of `commands`.
 
-use crate::common::{Scratch, identify, run, simulate};
+use crate::common::{Scratch, identify, run, simulate, tune};
 
 const TANK: [&str; 8] = [
     "--process",
@@ -300,6 +300,48 @@ fn a_relay_on_other_structures_and_in_a_loop() {
     let looped = ["--duration", "3", "--loop", "0.5,0.1", "--amplitude", "0.2"];
     let closed = Simulated::of(&ROLL, &looped);
     assert!(switches(&closed) > 5, "{}", switches(&closed));
+}
+
+// A relay holds 2/(s - 1) behind 0.1 s. Only who knows that it is unstable gets a model; it and its controller are one beside tune's.
+#[test]
+fn an_unstable_process_is_identified_by_those_who_know_it() {
+    let process = ["--process", "foptd,K=-2,T=-1,tau=0.1"];
+    let test = ["--duration", "20", "--sample-rate", "50", "--noise", "1%"];
+    let csv = simulate(&process, &test);
+    let refused = identify(&csv, &[]).no_process("not_this_process");
+    let message = refused.0["verdict"]["message"].as_str().unwrap();
+    assert!(
+        message.contains("unstable without its controller"),
+        "{message}"
+    );
+    assert!(
+        refused.advice().contains("--unstable"),
+        "{}",
+        refused.advice()
+    );
+    let found = identify(&csv, &["--unstable"]).report();
+    assert_eq!(found.kind(), "identified");
+    found
+        .near("k", -2.0, 0.05)
+        .near("t_body_s", -1.0, 0.05)
+        .near("tau_s", 0.1, 0.1);
+    assert_eq!(found.0["structure"], "foptd");
+    found.remarked(&["grows by itself", "1.0"]);
+    let known = tune(&process, &[]);
+    let gain = found.number("/controller/kp");
+    assert!(
+        (gain / known.number("/controller/kp") - 1.0).abs() < 0.5,
+        "{gain}"
+    );
+    // Nothing grows in a relay test of a stable one.
+    let stable = simulate(&["--process", "foptd,K=2,T=1,tau=0.1"], &test);
+    identify(&stable, &["--unstable"]).no_process("not_this_process");
+    identify(&csv, &["--unstable", "--structure", "soiptd"]).misused(&[
+        "--unstable",
+        "foptd",
+        "soptd",
+    ]);
+    identify(&csv, &["--unstable", "--cycles", "4"]).misused(&["--unstable", "--cycles"]);
 }
 
 // 3,000 rows, of which 5 % are dropped (150, standard deviation 12) and 10 % of the others have an outlier of exactly 0.3

@@ -85,7 +85,7 @@ pub(super) fn choose(record: &Record, structure: Option<Structure>) -> Option<(L
 }
 
 /// Whether the pole is on a boundary: as slow as it may be, or faster than a sample.
-fn is_at_edge(theta: &Theta, blocks: &Blocks<'_>) -> bool {
+pub(super) fn is_at_edge(theta: &Theta, blocks: &Blocks<'_>) -> bool {
     let bounds = Bounds::new(theta, blocks, theta.tau_s());
     let pole = theta.layout().pole();
     pole.is_some_and(|pole| bounds.is_at_edge(theta, pole))
