@@ -364,11 +364,18 @@ fn fit_within(
 ) -> Option<Candidate> {
     let bounds = Bounds::new(start, blocks, longest_tau_s);
     let free = start.free();
-    let found = descend(blocks, start, &free, &bounds, patience)?;
-    let mut found = match ordered(&found.theta) {
-        Some(theta) => descend(blocks, &theta, &free, &bounds, patience)?,
-        None => found,
+    let down = |start: &Theta| {
+        let found = descend(blocks, start, &free, &bounds, patience)?;
+        match ordered(&found.theta) {
+            Some(theta) => descend(blocks, &theta, &free, &bounds, patience),
+            None => Some(found),
+        }
     };
+    let mut found = down(start)?;
+    let other = hidden_in_the_dead_time(&found.theta, &bounds).and_then(|theta| down(&theta));
+    if let Some(other) = other.filter(|it| it.at.log_likelihood > found.at.log_likelihood) {
+        found = other;
+    }
     // Without a lag the response has a kink where a delayed step of the input meets a sample, and a search may stop there.
     let tau = start.layout().tau();
     if start.layout().stages.lags + start.layout().stages.pairs == 0 {
@@ -377,6 +384,20 @@ fn fit_within(
         found = descend(blocks, &along.theta, &free, &bounds, patience)?;
     }
     Some(Candidate::new(found))
+}
+
+/// A start for a process whose first lag lies on a bound: the lag in the place of the dead time. A descent that passes a gain of zero ends
+/// in a basin of the other sign, with a lag as long as the record and half a period in the dead time; one whose lag vanishes leaves
+/// it there too.
+fn hidden_in_the_dead_time(theta: &Theta, bounds: &Bounds) -> Option<Theta> {
+    let tau = theta.layout().tau();
+    if theta.layout().stages.lags == 0 || !bounds.is_at_edge(theta, 0) || theta.values[tau] <= 0.0 {
+        return None;
+    }
+    let mut other = *theta;
+    other.values[0] = theta.values[tau].ln();
+    other.values[tau] = 0.0;
+    Some(bounds.clamp(&other))
 }
 
 /// The same process with the actuator lag shorter than the body's. `None` if it is in order.
