@@ -223,7 +223,7 @@ impl Search<'_> {
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
-        judge_stability(fitted, blocks, tests, explained)?;
+        self.judge_stability(fitted, blocks, tests, explained)?;
         let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
         let is_left = is_left_to_the_input(tests) && explained < 0.0;
         if is_left || is_another && explained < WELL_PREDICTED {
@@ -246,6 +246,34 @@ impl Search<'_> {
                 })
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Refuses a process that is unstable without its controller: a reason why it is hardly predicted, or not explained by its input,
+    /// or why the pole of the fit is on its boundary. A random walk may take what grows, and leaves clean innovations. What is
+    /// predicted is refused for what it shows by itself only, and so is a structure that the user states: an unstable pole may
+    /// explain what they lack.
+    fn judge_stability(
+        &self,
+        fitted: &Fitted,
+        blocks: &Blocks<'_>,
+        tests: &InnovationTests,
+        explained: f64,
+    ) -> Result<(), Verdict> {
+        let theta = &fitted.best.found.theta;
+        let is_doubted = explained < WELL_PREDICTED
+            || is_left_to_the_input(tests)
+            || unstable::is_at_edge(theta, blocks);
+        if theta.grows || !is_doubted || !validate::is_fed_back(blocks) {
+            return Ok(());
+        }
+        let longest_tau_s = fitted.limits.longest_tau_s;
+        let is_open = explained < LEAST_PREDICTED && self.options.structure.is_none();
+        let better = || unstable::explains_better(&fitted.record, theta, longest_tau_s);
+        let growth_per_s = unstable::growth_per_s(blocks, theta.tau_s());
+        match growth_per_s.or_else(|| is_open.then(better).flatten()) {
+            Some(growth_per_s) => Err(Verdict::UnstableProcess { growth_per_s }),
+            None => Ok(()),
         }
     }
 
@@ -392,31 +420,6 @@ impl Search<'_> {
             }),
             other => other,
         }
-    }
-}
-
-/// Refuses a process that is unstable without its controller: a reason why it is hardly predicted, or not explained by its input, or
-/// why the pole of the fit is on its boundary. A random walk may take what grows, and leaves clean innovations. What is predicted
-/// well is refused for what it shows by itself only: an unstable pole may explain what a structure lacks.
-fn judge_stability(
-    fitted: &Fitted,
-    blocks: &Blocks<'_>,
-    tests: &InnovationTests,
-    explained: f64,
-) -> Result<(), Verdict> {
-    let theta = &fitted.best.found.theta;
-    let is_predicted = explained >= WELL_PREDICTED;
-    let is_at_edge = unstable::is_at_edge(theta, blocks);
-    let is_beyond_doubt = is_predicted && !is_at_edge && !is_left_to_the_input(tests);
-    if theta.grows || is_beyond_doubt || !validate::is_fed_back(blocks) {
-        return Ok(());
-    }
-    let longest_tau_s = fitted.limits.longest_tau_s;
-    let better = || unstable::explains_better(&fitted.record, theta, longest_tau_s);
-    let growth_per_s = unstable::growth_per_s(blocks, theta.tau_s());
-    match growth_per_s.or_else(|| better().filter(|_| is_at_edge || !is_predicted)) {
-        Some(growth_per_s) => Err(Verdict::UnstableProcess { growth_per_s }),
-        None => Ok(()),
     }
 }
 
