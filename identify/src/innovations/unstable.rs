@@ -43,17 +43,13 @@ const FREQUENCIES: [f64; 3] = [0.3, 1.0, 5.0];
 pub(super) fn growth_per_s(blocks: &Blocks<'_>, tau_s: f64) -> Option<f64> {
     let half = blocks.len() / 2;
     let past = OUTPUTS + 1 + (tau_s / blocks.block_s()) as usize;
-    let (early, late) = (
-        growth_in(blocks, 0..half, past, SURE)?,
-        growth_in(blocks, half..blocks.len(), past, SURE)?,
-    );
+    let growth_in = |part: Range<usize>| {
+        let root = Arx::<OUTPUTS>::of(blocks, part, past)?.root_above_one(SURE)?;
+        Some(root.ln() / blocks.block_s())
+    };
+    let (early, late) = (growth_in(0..half)?, growth_in(half..blocks.len())?);
     let is_same = early < ALIKE * late && late < ALIKE * early;
     is_same.then(|| (early * late).sqrt())
-}
-
-fn growth_in(blocks: &Blocks<'_>, part: Range<usize>, past: usize, sure: f64) -> Option<f64> {
-    let root = Arx::<OUTPUTS>::of(blocks, part, past)?.root_above_one(sure)?;
-    Some(root.ln() / blocks.block_s())
 }
 
 /// The fits with an unstable pole, and the limits of their search. `None` of uneven samples, whose feedback is sampled in between,
@@ -109,10 +105,17 @@ fn likely_growth_per_s(record: &Record) -> Option<f64> {
         .take_while(|samples| *samples == 1 || record.len() / samples >= FEWEST)
         .map(|samples| Blocks::new(record, samples, 0.0))
         .collect();
+    let fits: Vec<(Arx<OUTPUTS>, f64)> = rows
+        .iter()
+        .filter_map(|blocks| {
+            let fit = Arx::of(blocks, 0..blocks.len(), 2 * OUTPUTS)?;
+            Some((fit, blocks.block_s()))
+        })
+        .collect();
     let of = |sure: f64| {
-        let growths = rows.iter().filter_map(|blocks| {
-            let growth = growth_in(blocks, 0..blocks.len(), 2 * OUTPUTS, sure)?;
-            Some((growth, growth * blocks.block_s()))
+        let growths = fits.iter().filter_map(|(fit, block_s)| {
+            let over_a_row = fit.root_above_one(sure)?.ln();
+            Some((over_a_row / block_s, over_a_row))
         });
         let off = |over_a_row: f64| (over_a_row / OVER_A_ROW).ln().abs();
         let nearest = growths.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));

@@ -8,7 +8,8 @@ use crate::error::Error;
 use crate::source::Source;
 
 impl Request {
-    /// Refuses settings that a fit to the cycles of a relay test does not have.
+    /// Refuses structures without an unstable pole where one is asked for, and settings that a fit to the cycles of a relay test does
+    /// not have.
     pub(super) fn check_estimator(&self) -> Result<(), Error> {
         let has_one_pole = |structure| matches!(structure, Structure::Foptd | Structure::Soptd);
         if self.is_unstable && !self.structure.is_none_or(has_one_pole) {

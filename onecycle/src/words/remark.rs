@@ -301,8 +301,8 @@ fn of_result(remark: &Remark) -> Option<String> {
             )
         }
         Remark::Unstable(growth_s) => format!(
-            "Without its controller the output grows by itself, with a time constant of {}: its time constant is negative. Do not \
-             switch the controller off, and change its gains in small steps.",
+            "Without its controller the output grows by itself, by a factor of 2.7 in {}: the time constant of such a pole is \
+             written as a negative one. Do not switch the controller off, and change its gains in small steps.",
             seconds(growth_s)
         ),
         Remark::EqualLags { ref lags, mean_s } => equal_lags(lags, mean_s),
