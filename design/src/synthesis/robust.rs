@@ -9,7 +9,10 @@
 //!
 //! Few draws limit the gain, and about the same ones for all shapes near each other. The search *watches* those: a shape
 //! that the watched draws forbid is forbidden by all draws, whichever the others are. What it finds is confirmed on all
-//! draws; where other draws forbid it, they are watched too and the search goes on.
+//! draws; where other draws forbid it or leave it less gain, they are watched too and the search goes on.
+//!
+//! The limits of many draws make the cost a landscape of valleys with kinks, in which one simplex ends anywhere. So a search begins
+//! on three sides, and that of least cost goes on until another simplex lowers the cost no further.
 
 use crate::analysis::process::Process;
 
@@ -33,8 +36,8 @@ const DOUBT: f64 = 0.07;
 /// Draws watched at either end of the gain, beside those that may be given up.
 const SPARE: usize = 4;
 
-/// Searches with more watched draws each, before the result is moved back to where all draws keep the limits.
-const ROUNDS: usize = 5;
+/// Simplices with more watched draws each, before the result is moved back to where all draws keep the limits.
+const ROUNDS: usize = 12;
 
 /// Halvings of the way back.
 const HALVINGS: usize = 8;
@@ -46,9 +49,14 @@ const FIRST: Extent = Extent {
 };
 const SECOND: Extent = Extent {
     size: 0.1,
-    tolerance: 2e-2,
-    evaluations: 20,
+    tolerance: 3e-3,
+    evaluations: 50,
 };
+/// A search begins with a large simplex to either side, and with none.
+const SIDES: [f64; 3] = [1.0, -1.0, 0.0];
+/// The second simplex begins anew where it ended while that lowers the cost by this share: one that is flat along a limit ends far
+/// from the optimum.
+const LOWER: f64 = 1e-3;
 const FEASIBILITY: Extent = Extent {
     size: 0.4,
     tolerance: 3e-3,
@@ -105,6 +113,13 @@ pub(crate) struct Found {
     pub omega: f64,
     /// Logarithm by which the gain is infeasible.
     pub excess: f64,
+}
+
+/// A shape that keeps the limits on enough draws, with the logarithm of its cost.
+struct Kept {
+    cost: f64,
+    z: Vec<f64>,
+    found: Found,
 }
 
 /// The feasible gain that is highest; if none is, the least infeasible one.
@@ -342,27 +357,22 @@ impl Draws {
         near: Option<&[f64]>,
     ) -> Result<Optimum, NoOptimum> {
         let start = self.feasible(&nominal.z, near);
-        let (mut kept, mut found) = start.ok_or(NoOptimum::Infeasible)?;
-        let mut point = kept.clone();
-        for round in 0..ROUNDS {
-            let extents: &[(Extent, usize)] = if round == 0 {
-                &[(FIRST, FIRST_COST_DRAWS), (SECOND, SECOND_COST_DRAWS)]
-            } else {
-                &[(SECOND, SECOND_COST_DRAWS)]
-            };
-            for (extent, most) in extents {
-                let value = self.cost(&point, *most);
-                let mut cost = |z: &[f64]| self.cost(z, *most);
-                point = minimise(&mut cost, &Best { value, point }, *extent).point;
+        let start = start.ok_or(NoOptimum::Infeasible)?;
+        let mut least: Option<Kept> = None;
+        for side in SIDES {
+            let mut point = start.0.clone();
+            if side != 0.0 {
+                let size = side * FIRST.size;
+                let extent = Extent { size, ..FIRST };
+                point = self.lower(point, extent, FIRST_COST_DRAWS).point;
             }
-            if let Some(confirmed) = self.confirmed(&point) {
-                (kept, found) = (point.clone(), confirmed);
-                break;
+            let found = self.descended(&start, point, 1);
+            if least.as_ref().is_none_or(|least| found.cost < least.cost) {
+                least = Some(found);
             }
         }
-        if kept != point {
-            (kept, found) = self.towards(&point, (kept, found));
-        }
+        let Kept { z, found, .. } = least.ok_or(NoOptimum::Infeasible)?;
+        let Kept { z: kept, found, .. } = self.descended(&(z.clone(), found), z, ROUNDS);
         let mut best = nominal.clone();
         best.ln_cost = self
             .mean_cost(&kept, (found.k, found.omega), COST_DRAWS)
@@ -373,6 +383,52 @@ impl Draws {
         } else {
             Err(NoOptimum::Infeasible)
         }
+    }
+
+    /// The end of a search from `point`, or a shape that keeps the limits where that costs less. What a simplex finds with the
+    /// watched draws counts by its cost with all of them: others may leave it less gain.
+    fn descended(&mut self, kept: &(Vec<f64>, Found), mut point: Vec<f64>, rounds: usize) -> Kept {
+        let mut best = Kept {
+            cost: self.cost(&kept.0, SECOND_COST_DRAWS),
+            z: kept.0.clone(),
+            found: kept.1,
+        };
+        let mut is_confirmed = false;
+        for _ in 0..rounds {
+            let on_watched = self.lower(point, SECOND, SECOND_COST_DRAWS);
+            point = on_watched.point;
+            let confirmed = self.confirmed(&point);
+            is_confirmed = confirmed.is_some();
+            let Some(found) = confirmed else {
+                continue;
+            };
+            let cost = self.cost(&point, SECOND_COST_DRAWS);
+            let fell = best.cost - cost;
+            if fell > 0.0 {
+                let z = point.clone();
+                best = Kept { cost, z, found };
+            } else {
+                point.clone_from(&best.z);
+            }
+            if fell < LOWER && cost - on_watched.value < LOWER {
+                break;
+            }
+        }
+        if !is_confirmed {
+            let (z, found) = self.towards(&point, (best.z.clone(), best.found));
+            let cost = self.cost(&z, SECOND_COST_DRAWS);
+            if cost < best.cost {
+                best = Kept { cost, z, found };
+            }
+        }
+        best
+    }
+
+    /// The end of a simplex from a shape, with the logarithm of its cost.
+    fn lower(&mut self, point: Vec<f64>, extent: Extent, most: usize) -> Best {
+        let value = self.cost(&point, most);
+        let mut cost = |z: &[f64]| self.cost(z, most);
+        minimise(&mut cost, &Best { value, point }, extent)
     }
 
     /// Gain of a shape if enough of all draws keep the limits. The draws that limit it are watched from then on.
