@@ -28,12 +28,10 @@ PHONE = {"viewport": {"width": 360, "height": 780}, "device_scale_factor": 2, "i
 # with the system's library: they differ in the last bit, and the search for the best fit ends a few of its tolerances elsewhere.
 CLOSE = 1e-3
 # The design over draws ends where a search that begins anew lowers the mean load error by less than 0.1 %. Near the optimum the
-# gains may then differ by the root of that, and more so what follows from them.
+# gains may then differ by the root of that, and what follows from them.
 SAME_COST = 3e-3
-SAME_GAINS = 3e-2
-OF_GAINS = 0.15
-GAINS = (".answer.gains", ".controller.")
-OF_DESIGN = (".answer", ".controllers", ".margins", ".step", ".robustness", ".resonance_factor", ".limits_not_kept")
+SAME_GAINS = 2e-2
+OF_DESIGN = (".answer", ".controller", ".margins", ".step", ".robustness", ".resonance_factor", ".limits_not_kept")
 COST = ".mean_iae"
 # Tests of the residuals, which are sums of small differences.
 LOOSE = 5e-2
@@ -209,9 +207,8 @@ def numbers(studio, told):
         where, worst = max(found, key=lambda pair: pair[1])
         print(f"{name}: {same} of {len(found)} numbers equal to the bit, largest difference {worst:.1e} ({where})")
         for place, difference in found:
-            limit = next((limit for limit, is_so in (
-                (LOOSE, place.startswith(SIDE)), (SAME_COST, place.endswith(COST)),
-                (SAME_GAINS, place.startswith(GAINS)), (OF_GAINS, place.startswith(OF_DESIGN))) if is_so), CLOSE)
+            limits = [(place.startswith(SIDE), LOOSE), (place.endswith(COST), SAME_COST), (place.startswith(OF_DESIGN), SAME_GAINS)]
+            limit = next((limit for is_so, limit in limits if is_so), CLOSE)
             expect(difference <= limit, f"{name}: {place} differs by {difference:.1e}")
 
 
@@ -292,7 +289,7 @@ def written(told, log, axis, options=()):
 def same_parameters(ours, theirs):
     ours, theirs = parameters(ours), parameters(theirs)
     expect(list(ours) == list(theirs), f"{ours} and {theirs}")
-    expect(all(abs(value / theirs[name] - 1) < SAME_GAINS for name, value in ours.items()), f"{ours} and {theirs}")
+    expect(all(abs(value / theirs[name] - 1) < 2 * CLOSE for name, value in ours.items()), f"{ours} and {theirs}")
 
 
 def set_by_hand(studio):
@@ -520,7 +517,7 @@ def answered(browser, told):
     now = {gain["name"]: gain for gain in first["answer"]["gains"]}
     for name, *values in named():
         for value, column in zip(values, ("now", "half", "full")):
-            expect(abs(float(value) / now[name][column] - 1) < SAME_GAINS, f"{name} {column} {value}, not {now[name][column]}")
+            expect(abs(float(value) / now[name][column] - 1) < 2 * CLOSE, f"{name} {column} {value}, not {now[name][column]}")
     # What moves by hand has its name too.
     before = named()
     page.fill("#exact-kp", str(0.9 * page.evaluate("gains.kp")))
@@ -576,7 +573,7 @@ def answered(browser, told):
     gains = theirs["answer"]["gains"]
     rows = [row.split("\t") for row in page.inner_text("#named tbody").splitlines()]
     expect([row[0].split(" (")[0] for row in rows] == [gain["name"] for gain in gains], f"{rows} and {gains}")
-    expect(all(abs(float(row[-1]) - gain["full"]) <= SAME_GAINS * abs(gain["full"]) for row, gain in zip(rows, gains)), f"{rows} and {gains}")
+    expect(all(abs(float(row[-1]) - gain["full"]) <= 2 * CLOSE * abs(gain["full"]) for row, gain in zip(rows, gains)), f"{rows} and {gains}")
     studio.close()
     # On a phone the responses stay in sight while the gains move.
     studio = Studio(browser, told.page, is_automatic=True, viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)

@@ -116,6 +116,7 @@ pub(crate) struct Found {
 }
 
 /// A shape that keeps the limits on enough draws, with the logarithm of its cost.
+#[derive(Clone)]
 struct Kept {
     cost: f64,
     z: Vec<f64>,
@@ -357,27 +358,27 @@ impl Draws {
         near: Option<&[f64]>,
     ) -> Result<Optimum, NoOptimum> {
         let start = self.feasible(&nominal.z, near);
-        let start = start.ok_or(NoOptimum::Infeasible)?;
-        let mut least: Option<Kept> = None;
+        let (z, found) = start.ok_or(NoOptimum::Infeasible)?;
+        let cost = self.cost(&z, SECOND_COST_DRAWS);
+        let start = Kept { cost, z, found };
+        let mut least = start.clone();
         for side in SIDES {
-            let mut point = start.0.clone();
+            let mut point = start.z.clone();
             if side != 0.0 {
                 let size = side * FIRST.size;
                 let extent = Extent { size, ..FIRST };
                 point = self.lower(point, extent, FIRST_COST_DRAWS).point;
             }
-            let found = self.descended(&start, point, 1);
-            if least.as_ref().is_none_or(|least| found.cost < least.cost) {
-                least = Some(found);
+            let found = self.descended(start.clone(), point, 1);
+            if found.cost < least.cost {
+                least = found;
             }
         }
-        let Kept { z, found, .. } = least.ok_or(NoOptimum::Infeasible)?;
-        let Kept { z: kept, found, .. } = self.descended(&(z.clone(), found), z, ROUNDS);
+        let point = least.z.clone();
+        let Kept { z, found, .. } = self.descended(least, point, ROUNDS);
         let mut best = nominal.clone();
-        best.ln_cost = self
-            .mean_cost(&kept, (found.k, found.omega), COST_DRAWS)
-            .ln();
-        (best.z, best.gain.k, best.gain.omega) = (kept, found.k, found.omega);
+        best.ln_cost = self.mean_cost(&z, (found.k, found.omega), COST_DRAWS).ln();
+        (best.z, best.gain.k, best.gain.omega) = (z, found.k, found.omega);
         if best.ln_cost < NO_COST {
             Ok(best)
         } else {
@@ -385,14 +386,9 @@ impl Draws {
         }
     }
 
-    /// The end of a search from `point`, or a shape that keeps the limits where that costs less. What a simplex finds with the
-    /// watched draws counts by its cost with all of them: others may leave it less gain.
-    fn descended(&mut self, kept: &(Vec<f64>, Found), mut point: Vec<f64>, rounds: usize) -> Kept {
-        let mut best = Kept {
-            cost: self.cost(&kept.0, SECOND_COST_DRAWS),
-            z: kept.0.clone(),
-            found: kept.1,
-        };
+    /// The end of a search from `point`, or `best` where that costs less. What a simplex finds with the watched draws counts by its
+    /// cost with all of them: others may leave it less gain.
+    fn descended(&mut self, mut best: Kept, mut point: Vec<f64>, rounds: usize) -> Kept {
         let mut is_confirmed = false;
         for _ in 0..rounds {
             let on_watched = self.lower(point, SECOND, SECOND_COST_DRAWS);
