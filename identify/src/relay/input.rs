@@ -39,10 +39,21 @@ pub(super) fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
         InputKind::Relay(relay) => Ok(relay),
         InputKind::Constant => Err(Verdict::ConstantInput),
         InputKind::FewSwitches { switches } => Err(Verdict::FewSwitches { switches }),
-        InputKind::NotTwoLevels => {
-            let output_is_relay = matches!(find(signals.output), InputKind::Relay(_));
-            Err(Verdict::NoRelay { output_is_relay })
+        InputKind::NotTwoLevels => Err(Verdict::NoRelay {
+            output_is_relay: is_relay_alone(signals.output),
+        }),
+    }
+}
+
+/// Whether a signal does nothing but switch between two levels. One jump of an output on a coarse display looks like a relay of two
+/// samples, but the output moves before and after it.
+fn is_relay_alone(signal: &[f64]) -> bool {
+    let is_held = |part: &[f64]| part.windows(2).all(|pair| pair[0] == pair[1]);
+    match find(signal) {
+        InputKind::Relay(RelayInput { span, .. }) => {
+            is_held(&signal[..=span.start]) && is_held(&signal[span.end..])
         }
+        _ => false,
     }
 }
 
@@ -225,6 +236,17 @@ mod tests {
         let mut constant = vec![2.5; 5000];
         constant[700..702].fill(30.0);
         assert_eq!(find(&constant), InputKind::Constant);
+    }
+
+    // The speed of a motor in steps of 20: it rises within a sample, then follows an input of many levels.
+    #[test]
+    fn one_jump_of_a_coarse_output_is_no_relay() {
+        let wave = wave(|x| 20.0 * (35.0 + 5.0 * (x * std::f64::consts::TAU).sin()).round());
+        let output = [&[0.0], &wave[..]].concat();
+        assert!(matches!(find(&output), InputKind::Relay(_)));
+        assert!(!is_relay_alone(&output));
+        let step = [vec![0.0; 300], vec![1.0; 700]].concat();
+        assert!(is_relay_alone(&step));
     }
 
     #[test]
