@@ -55,6 +55,8 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
+use std::f64::consts::FRAC_PI_2;
+
 use onecycle_design::{Design, Parameter, Structure};
 
 use self::choose::NEARLY;
@@ -62,7 +64,7 @@ use self::fitted::{Disturbances, Fitted};
 use self::mixture::Component;
 pub(crate) use self::orthogonal::{Orthogonal, dot};
 pub use self::plan::expected;
-use self::prepare::{FEWEST, Prepared, prepare};
+use self::prepare::{FEWEST, FLOOR, Prepared, prepare};
 pub use self::record::Hold;
 use self::record::{Blocks, Record};
 pub(crate) use self::result::gain_of;
@@ -82,8 +84,8 @@ use crate::remarks;
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::thresholds::{
-    ANOTHER_KIND, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED, MOST_DEVIATION,
-    MOST_ERROR_RATIO, MOST_TAKEN, STRONGLY_COLOURED, WELL_PREDICTED,
+    ANOTHER_KIND, BELIEVED_LESS, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED,
+    MOST_DEVIATION, MOST_ERROR_RATIO, MOST_TAKEN, STRONGLY_COLOURED, WELL_PREDICTED,
 };
 use crate::verdict::Verdict;
 
@@ -97,10 +99,40 @@ pub(crate) const ROWS: usize = 1200;
 const FITTED: f64 = 0.8;
 const TESTED: f64 = 0.85;
 
-/// Identifies the process from a record of any input.
+/// Identifies the process from a record of any input: as near to its samples as their noise allows, or as near as a model of low order
+/// comes.
 pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
+    let found = identify_to(FLOOR, signals, options);
+    // The parts of a flight log are many, and another one may be better.
+    if options.is_under_way || !(found.outcome.as_ref()).is_err_and(Verdict::is_of_fit) {
+        return found;
+    }
+    let mut nearly = identify_to(BELIEVED_LESS, signals, options);
+    if !is_beyond_doubt(&nearly) {
+        return found;
+    }
+    nearly.remarks.push(Remark::ModelError(BELIEVED_LESS));
+    nearly
+}
+
+/// Whether the model of a fit that leaves more than noise predicts well, with a dead time of less than a quarter of the longest period:
+/// one of half a period stands for the other sign of the gain.
+fn is_beyond_doubt(found: &Identification) -> bool {
+    let (Ok(identified), Some(Excitation::Recorded(of))) = (&found.outcome, found.excitation)
+    else {
+        return false;
+    };
+    let prediction = (identified.fit.innovations()).and_then(|fit| fit.prediction);
+    let lowest_rad_per_s = of.informative_rad_per_s.map_or(0.0, |band| band.0);
+    prediction.is_some_and(|prediction| prediction.is_good())
+        && identified.model.linear().tau_s() * lowest_rad_per_s < FRAC_PI_2
+}
+
+/// Identifies the process, where samples are believed to this share of the movement of the output.
+fn identify_to(believed: f64, signals: &Signals<'_>, options: &Options) -> Identification {
     let mut search = Search {
         options,
+        believed,
         excitation: None,
         refused: None,
         remarks: vec![],
@@ -127,6 +159,8 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
 
 struct Search<'a> {
     options: &'a Options,
+    /// Share of the movement of the output to which a sample is believed.
+    believed: f64,
     excitation: Option<Recorded>,
     refused: Option<Refused>,
     remarks: Vec<Remark>,
@@ -139,7 +173,7 @@ impl Search<'_> {
             .specification
             .check()
             .map_err(Verdict::NoController)?;
-        let mut prepared = prepare(signals, self.options)?;
+        let mut prepared = prepare(signals, self.options, self.believed)?;
         let outliers = outliers::mark_far(&mut prepared.record);
         self.excitation = Some(describe(&prepared, outliers));
         if let Some(filter) = prepared.filter {
@@ -170,7 +204,7 @@ impl Search<'_> {
         }
         let judged = self.judge(&fitted, &blocks, &components, &tests, prediction.as_ref());
         let outcome = judged.and_then(|()| {
-            self.remark(&fitted, &tests, prediction.as_ref());
+            self.remark(&fitted, &blocks, &tests, prediction.as_ref());
             let checked = (tests, prediction);
             self.design(&prepared, &fitted, &blocks, &components, checked)
         });
@@ -324,6 +358,7 @@ impl Search<'_> {
     fn remark(
         &mut self,
         fitted: &Fitted,
+        blocks: &Blocks<'_>,
         tests: &InnovationTests,
         prediction: Option<&Prediction>,
     ) {
@@ -341,8 +376,11 @@ impl Search<'_> {
             None
         };
         (self.remarks).extend(fault.filter(|_| fitted.disturbances != Disturbances::Doubted));
-        let is_weak = |found: &&Prediction| {
-            found.explained < 0.0 || !found.is_good() && !found.is_as_good_as_disturbances_allow()
+        // Worse than the mean is no prediction, whatever the disturbances: under feedback alone the input answers to those that are
+        // still to come, and less of them is left in the output than in the prediction.
+        let is_weak = |found: &&Prediction| match found.is_as_good_as_disturbances_allow() {
+            true => found.explained < 0.0 && !validate::is_fed_back(blocks),
+            false => !found.is_good(),
         };
         if let Some(prediction) = prediction.filter(is_weak) {
             self.remarks.push(Remark::WeakPrediction {
@@ -406,18 +444,22 @@ impl Search<'_> {
             || fit(fitted, blocks, prepared.start_s, checked),
         );
         self.remarks = remarks;
-        // What the model lacks counts by what it does to the loop.
+        // What the model lacks counts by what it does to the loop, whatever the fit took for noise.
+        let is_doubted = is_left_to_the_input(&tests) || self.believed > FLOOR;
         let is_risky = |design: Design| {
-            let theta = &fitted.best.found.theta;
-            let span_s = theta.span_s();
-            let taken =
-                || flexible::distance_taken(&fitted.record, span_s, &model, &design.controller);
-            is_left_to_the_input(&tests) && taken() > MOST_TAKEN
+            let record = Record {
+                floor: fitted.record.floor * FLOOR / self.believed,
+                ..fitted.record.clone()
+            };
+            let span_s = fitted.best.found.theta.span_s();
+            flexible::distance_taken(&record, span_s, &model, &design.controller) > MOST_TAKEN
         };
         match found {
-            Ok(found) if found.design.is_some_and(is_risky) => Err(Verdict::InputLeft {
-                share: tests.input_share,
-            }),
+            Ok(found) if is_doubted && found.design.is_some_and(is_risky) => {
+                Err(Verdict::InputLeft {
+                    share: tests.input_share,
+                })
+            }
             other => other,
         }
     }
@@ -466,9 +508,18 @@ fn fit(
 
 /// What is known of a recording before any fit. `None` if none can be made.
 pub(crate) fn recorded(signals: &Signals<'_>, options: &Options) -> Option<Recorded> {
-    let mut prepared = prepare(signals, options).ok()?;
+    let mut prepared = prepare(signals, options, FLOOR).ok()?;
     let outliers = outliers::mark_far(&mut prepared.record);
     Some(describe(&prepared, outliers))
+}
+
+/// Whether the input follows the output, as that of a relay in a loop does and a test signal does not.
+pub(crate) fn is_fed_back(signals: &Signals<'_>, options: &Options) -> bool {
+    prepare(signals, options, FLOOR).is_ok_and(|prepared| {
+        let record = &prepared.record;
+        let samples = (record.len() / ROWS).max(1);
+        validate::follows(&Blocks::new(record, samples, 0.0))
+    })
 }
 
 fn describe(prepared: &Prepared, outliers: usize) -> Recorded {

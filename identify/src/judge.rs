@@ -109,6 +109,13 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
         true => None,
         false => Some(relay::steady(&used)),
     };
+    // Nor is a random signal of two levels, whose waves are never alike.
+    let steady = steady.filter(|found| match found {
+        Err(Verdict::NotSteady { .. } | Verdict::Saturated { .. }) => {
+            innovations::is_fed_back(signals, options)
+        }
+        _ => true,
+    });
     let final_verdict = match &steady {
         Some(Err(verdict)) if is_final(verdict, &used) => Some(verdict.clone()),
         _ => None,

@@ -92,6 +92,9 @@ pub enum Remark {
     OtherStructures(Vec<Structure>),
     /// The innovations are not white. The value is their largest autocorrelation; the intervals are widened.
     Coloured(f64),
+    /// No fit to the noise of the recording can be believed, so samples were believed to this share of the movement of the output, as for
+    /// an error of the model.
+    ModelError(f64),
     /// The past input explains a share of the innovations: the model lacks something.
     InputLeft(f64),
     /// The model predicts less than nine tenths of the variance of data that it was not fitted to.
@@ -250,6 +253,7 @@ impl Remark {
             Self::Nonlinear(_) => "nonlinear",
             Self::OtherStructures(_) => "other_structures",
             Self::Coloured(_) => "coloured",
+            Self::ModelError(_) => "model_error",
             Self::InputLeft(_) => "input_left",
             Self::WeakPrediction { .. } => "weak_prediction",
             Self::DriftOrGain => "drift_or_gain",

@@ -229,6 +229,17 @@ impl fmt::Display for Verdict {
 }
 
 impl Verdict {
+    /// Whether a fit that comes less near to the noise of the recording may be believed.
+    pub(crate) fn is_of_fit(&self) -> bool {
+        matches!(
+            self,
+            Self::NoInformation { .. }
+                | Self::AtBound(_)
+                | Self::NoPrediction { .. }
+                | Self::InputLeft { .. }
+        )
+    }
+
     /// Clause of a verdict on the input.
     fn write_input(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

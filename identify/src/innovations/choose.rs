@@ -141,6 +141,8 @@ pub(super) struct Limits {
     pub(super) longest_tau_s: f64,
     /// Inverse of the lowest frequency of the excitation (s).
     pub(super) slowest_s: f64,
+    /// Period of the excitation (s).
+    pub(super) period_s: f64,
     /// The only structure to fit.
     pub(super) structure: Option<Structure>,
     /// Fewest samples a row.
@@ -160,6 +162,8 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
     let starts = search::promising(&blocks, starts, tau_s);
     let mut all = part(SCREENED..RACED, || {
         let mut all = search::race(&blocks, &starts, None, tau_s);
+        let aliases = aliases(&all, limits.period_s);
+        all.extend(search::race(&blocks, &aliases, None, tau_s));
         if let Some(lead) = search::best(all.clone()) {
             let starts = search::noise_sets(lead.found.theta);
             all.extend(search::race(&blocks, &starts, Some(&lead), tau_s));
@@ -189,6 +193,22 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
         all: best_of_each(all),
         samples,
     }
+}
+
+/// Starts half a period of the input, or several, before the best fit of each structure: after the first of them a periodic input tells a
+/// dead time only up to half a period, with the sign of the gain.
+fn aliases(all: &[Candidate], period_s: f64) -> Vec<Theta> {
+    let half_s = 0.5 * period_s;
+    let earlier = |found: Candidate| {
+        let mut theta = found.found.theta;
+        let tau = theta.layout().tau();
+        let halves = (theta.values[tau] / half_s).round();
+        theta.values[tau] = (theta.values[tau] - halves * half_s).max(0.0);
+        (halves > 0.0).then_some(theta)
+    };
+    (best_of_each(all.to_vec()).into_iter())
+        .filter_map(earlier)
+        .collect()
 }
 
 /// The best starts of each kind of noise and structure, on each part that is screened.

@@ -85,6 +85,15 @@ enum Before {
     Another { skip_s: f64 },
 }
 
+/// Whether the input is held at a first level, and ten times as long or longer at a second one.
+fn begins_with_a_step(input: &[f64]) -> bool {
+    let mut levels = input.chunk_by(|a, b| a == b).map(<[f64]>::len);
+    let (first, second) = (levels.next(), levels.next());
+    first
+        .zip(second)
+        .is_some_and(|(first, second)| second >= 10 * first)
+}
+
 /// What explains the beginning of a record best, from each of `thetas`.
 fn before(record: &Record, limits: &Limits, thetas: &[Theta]) -> Before {
     let longest_tau_s = limits.longest_tau_s;
@@ -123,9 +132,14 @@ fn before(record: &Record, limits: &Limits, thetas: &[Theta]) -> Before {
     let of_another = thetas.last().into_iter().chain(&at_rest_theta);
     let another = (of_another.filter_map(after)).min_by(|a, b| a.0.total_cmp(&b.0));
     let (at_rest, unknown) = (least_bic(at_rest), least_bic(least(record)));
+    // Few rows before a step hardly tell that they are at rest, but who records one waits for it.
+    let doubt = match begins_with_a_step(&record.input) {
+        true => NEARLY,
+        false => 0.0,
+    };
     match another {
         Some((bic, skip_s)) if bic < at_rest.min(unknown) => Before::Another { skip_s },
-        _ if at_rest < unknown => Before::Rest,
+        _ if at_rest < unknown + doubt => Before::Rest,
         _ => Before::Unknown,
     }
 }
@@ -178,7 +192,9 @@ fn choose_on(
     remarks: &mut Vec<Remark>,
 ) -> Option<Choice> {
     let mut part = record.part(part).rounded(CHOOSING_STAMP);
-    let slowest_s = validate::slowest_s(&Blocks::new(&part, 1, 0.0)).unwrap_or(f64::INFINITY);
+    let samples = Blocks::new(&part, 1, 0.0);
+    let slowest_s = validate::slowest_s(&samples).unwrap_or(f64::INFINITY);
+    let period_s = validate::period_s(&samples).unwrap_or(f64::INFINITY);
     // At rest before the record, at rest where a part begins: the input moves where the part tells most.
     part.rest = part.rest.or(record.rest.map(|_| part.input[0]));
     let length_s = part.time_s(part.len() - 1);
@@ -186,6 +202,7 @@ fn choose_on(
         skip_s: limits.skip_s.max(SKIPPED * length_s),
         longest_tau_s: LONGEST_TAU * length_s,
         slowest_s,
+        period_s,
         ..*limits
     };
     let mut choice = choose(&part, &limits, starts);

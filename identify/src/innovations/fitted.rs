@@ -78,6 +78,7 @@ impl Fitted {
             skip_s: 0.0,
             longest_tau_s: longest,
             slowest_s: f64::INFINITY,
+            period_s: f64::INFINITY,
             structure: options.structure,
             fewest_samples: 1,
         };

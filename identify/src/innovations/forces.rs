@@ -14,6 +14,7 @@ use super::search::{self, Candidate};
 use super::theta::Theta;
 use super::validate;
 use crate::nonlinear::Nonlinear;
+use crate::signals::range;
 
 /// Half width of the cubic over the period of the excitation.
 const HALF_WIDTH: f64 = 1.0 / 14.0;
@@ -99,7 +100,7 @@ pub(super) fn forces(
                 continue;
             };
             let least = next.as_ref().map_or(lead.bic - ASKED, |(_, next)| next.bic);
-            if found.bic < least && is_physical(&trial.forces, &found) {
+            if found.bic < least && is_physical(&trial, &found) {
                 next = Some((asked, found));
             }
         }
@@ -122,11 +123,17 @@ pub(super) fn nonlinear(found: &Found, forces: &Forces) -> Nonlinear {
     }
 }
 
-/// Whether the forces of the rate oppose the motion.
-fn is_physical(forces: &Forces, found: &Candidate) -> bool {
+/// Whether the forces of the rate oppose the motion, and the thrust grows with the input over all of its range: that of an on-off input
+/// may have any square.
+fn is_physical(record: &Record, found: &Candidate) -> bool {
+    let forces = &record.forces;
     let coefficients = found.found.at.forces.iter();
     let mut of_rate = coefficients.take(forces.of_rate().count());
-    of_rate.all(|(value, _)| *value < 0.0)
+    let nonlinear = nonlinear(&found.found, forces);
+    let (low, high) = range(&record.input);
+    let slope =
+        |input: f64| 1.0 + 2.0 * nonlinear.thrust.unwrap_or(0.0) * (input - nonlinear.middle);
+    of_rate.all(|(value, _)| *value < 0.0) && slope(low) > 0.0 && slope(high) > 0.0
 }
 
 /// Rate of the output at each sample (output unit/s).

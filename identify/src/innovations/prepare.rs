@@ -51,11 +51,16 @@ pub(super) struct Prepared {
     pub(super) rounding: f64,
 }
 
-/// Record of the longest part of the recording without a gap, within the span of `options`.
+/// Record of the longest part of the recording without a gap, within the span of `options`. `believed`: share of the movement of the
+/// output to which a sample is believed, at least [`FLOOR`].
 ///
 /// # Errors
 /// [`Verdict::TooFewRows`], [`Verdict::ConstantInput`], [`Verdict::ConstantOutput`] or [`Verdict::Units`].
-pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepared, Verdict> {
+pub(super) fn prepare(
+    signals: &Signals<'_>,
+    options: &Options,
+    believed: f64,
+) -> Result<Prepared, Verdict> {
     let (from_s, to_s) = options.span_s;
     let first = from_s.map_or(0, |at| signals.time_s.partition_point(|t| *t < at));
     let end = to_s.map_or(signals.time_s.len(), |at| {
@@ -87,7 +92,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     record.hold = options.hold.unwrap_or(Hold::Held);
     record.rest = rest;
     let (rounding, sharing) = rounding(&record);
-    record.floor = (FLOOR * movement(&record)).max(rounding * sharing.sqrt());
+    record.floor = (believed * movement(&record)).max(rounding * sharing.sqrt());
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -367,7 +372,7 @@ mod tests {
             sample_period_s: 0.01,
             breaks,
         };
-        prepare(&signals, &Options::default()).unwrap()
+        prepare(&signals, &Options::default(), FLOOR).unwrap()
     }
 
     // Stamps 10 ms apart with jitter of 0.2 ms, and every seventh sample missing: 350 steps, 300 present.

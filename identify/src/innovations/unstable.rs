@@ -67,6 +67,7 @@ pub(super) fn choose(record: &Record, structure: Option<Structure>) -> Option<(L
         skip_s,
         longest_tau_s: longest_tau_s.min(1.0 / growth_per_s),
         slowest_s: f64::INFINITY,
+        period_s: f64::INFINITY,
         structure,
         fewest_samples: samples,
     };

@@ -190,7 +190,7 @@ pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
 }
 
 /// Whether past outputs explain the input beyond what past inputs do.
-fn follows(blocks: &Blocks<'_>) -> bool {
+pub(super) fn follows(blocks: &Blocks<'_>) -> bool {
     let inputs = blocks.mean_inputs();
     let outputs: Vec<f64> = (0..blocks.len())
         .map(|block| blocks.mean_output(block).unwrap_or(0.0))

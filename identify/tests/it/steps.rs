@@ -313,3 +313,16 @@ fn a_response_that_begins_in_the_wrong_direction() {
         "{verdict:?}"
     );
 }
+
+// A short test of a process read by a noisy sensor: the rows before the step hardly tell that it was at rest.
+#[test]
+fn a_short_step_is_one_from_rest_whatever_few_rows_are_before_it() {
+    let process = [0.45, 33.0, 6.7, 3.7];
+    for rest in [1, 2, 3, 8] {
+        let test = Test::of_process(process, &[(f64::from(rest), 4.0)], 230 + rest as usize);
+        let found = test.identify(&Options::default());
+        let identified = found.outcome.as_ref().unwrap();
+        let gain = identified.estimate.get(Parameter::K).unwrap();
+        assert!(gain.holds(0.45), "{rest} rows: {gain:?}");
+    }
+}

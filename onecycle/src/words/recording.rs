@@ -80,7 +80,7 @@ fn advice_on_unit(step: f64, possible: &[TimeUnit], usual: Option<TimeUnit>) -> 
         _ => "",
     };
     let (usual, others) = (usual.symbol(), others.join(" or "));
-    format!("give `time_unit={usual}`, the most usual of these, or {others}{rate}")
+    format!("give `time_unit={usual}` or {others}{rate}")
 }
 
 fn advice_on_file(error: &ReadError) -> Option<&'static str> {
@@ -315,13 +315,13 @@ mod tests {
     fn units_of_time_in_doubt() {
         assert_refused(
             "t,y,u\n0,1,1\n1,2,1\n2,3,1\n",
-            "\"t\" (column 1) gives no unit of time: a step of 1 is 1 ms or 1 s; give `time_unit=s`, \
-             the most usual of these, or `time_unit=ms`, or, if the column counts rows, `sample_rate`",
+            "\"t\" (column 1) gives no unit of time: a step of 1 is 1 ms or 1 s; give `time_unit=s` or \
+             `time_unit=ms`, or, if the column counts rows, `sample_rate`",
         );
         assert_refused(
             "t,y,u\n0,1,1\n4000,2,1\n8000,3,1\n",
             "\"t\" (column 1) gives no unit of time: a step of 4000 is 4000 us or 4000 ms; give \
-             `time_unit=us`, the most usual of these, or `time_unit=ms`",
+             `time_unit=us` or `time_unit=ms`",
         );
         assert_refused(
             "t,y,u\n50000000000000000,1,1\n50000000000100000,2,1\n",

@@ -170,6 +170,11 @@ fn of_record(remark: &Remark) -> Option<String> {
             "What the model did not predict is not white noise (largest autocorrelation {autocorrelation:.2}): the \
              intervals are widened for it."
         ),
+        Remark::ModelError(share) => format!(
+            "The process does more than a model of low order: none explains the recording to its noise. Gain and lags are \
+             those of the fit that comes near to it; what is beside it, {:.0} % of the movement of the output or less, was taken for noise.",
+            100.0 * share
+        ),
         Remark::InputLeft(share) => format!(
             "The past input explains {:.1} % of what the model did not predict: the process has more than the model, \
              such as a resonance, friction or a saturation. Try another structure with `structure`.",
@@ -354,6 +359,7 @@ mod tests {
             Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
             Remark::Coloured(0.31),
             Remark::InputLeft(0.024),
+            Remark::ModelError(0.01),
             Remark::WeakPrediction {
                 explained: -0.2,
                 horizon_s: 0.5,
