@@ -19,6 +19,7 @@
 //! "System Identification" (1999), section 7.4, with unknown initial state (P. de Jong, Biometrika 75 (1988)).
 
 mod arx;
+mod before_fit;
 mod choose;
 mod chosen;
 #[cfg(test)]
@@ -59,6 +60,8 @@ use std::f64::consts::FRAC_PI_2;
 
 use onecycle_design::{Design, Parameter, Structure};
 
+use self::before_fit::describe;
+pub(crate) use self::before_fit::{input_follows, recorded};
 use self::choose::NEARLY;
 use self::fitted::{Disturbances, Fitted};
 use self::mixture::Component;
@@ -74,9 +77,7 @@ pub(crate) use self::validate::is_left_to_the_input;
 use crate::assumed::recorded_filter;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
-use crate::outcome::{
-    Evidence, Fit, FitPoint, Identification, Identified, InnovationTests, Prediction, Refused,
-};
+use crate::outcome::{Identification, Identified, InnovationTests, Prediction, Refused};
 use crate::posterior::{Draw, Posterior};
 use crate::progress::part;
 use crate::remark::Remark;
@@ -209,7 +210,7 @@ impl Search<'_> {
             self.design(&prepared, &fitted, &blocks, &components, checked)
         });
         if outcome.is_err() {
-            let fit = fit(&fitted, &blocks, prepared.start_s, (tests, prediction, 1.0));
+            let fit = result::fit(&fitted, &blocks, prepared.start_s, (tests, prediction, 1.0));
             let model = result::model(&fitted.best.found, prepared.early_s);
             self.refused = fit.map(|fit| Refused { model, fit });
         }
@@ -441,7 +442,7 @@ impl Search<'_> {
             specification,
             &mut remarks,
             |width| self.no_information(&fitted.best.found.theta, width),
-            || fit(fitted, blocks, prepared.start_s, checked),
+            || result::fit(fitted, blocks, prepared.start_s, checked),
         );
         self.remarks = remarks;
         // What the model lacks counts by what it does to the loop, whatever the fit took for noise.
@@ -483,66 +484,4 @@ fn begins_at_rest(structure: Structure, posterior: &Posterior, sample_s: f64) ->
     let draws = posterior.draws();
     let late = draws.iter().filter(|draw| late_s(draw) > sample_s).count();
     structure.stages().integrators == 0 && late as f64 > 0.95 * draws.len() as f64
-}
-
-/// The fit as a result. `None` if the filter does not converge.
-fn fit(
-    fitted: &Fitted,
-    blocks: &Blocks<'_>,
-    start_s: f64,
-    checked: (InnovationTests, Option<Prediction>, f64),
-) -> Option<Fit> {
-    let explained = checked.1.map_or(1.0, |prediction| prediction.explained);
-    let innovations = result::innovations(fitted, blocks, start_s, checked)?;
-    let points = innovations.rows.iter().map(|row| FitPoint {
-        time_s: row.time_s,
-        measured: row.measured,
-        fitted: row.simulated,
-    });
-    Some(Fit {
-        misfit: (1.0 - explained).max(0.0).sqrt(),
-        points: points.collect(),
-        evidence: Evidence::Innovations(innovations),
-    })
-}
-
-/// What is known of a recording before any fit. `None` if none can be made.
-pub(crate) fn recorded(signals: &Signals<'_>, options: &Options) -> Option<Recorded> {
-    let mut prepared = prepare(signals, options, FLOOR).ok()?;
-    let outliers = outliers::mark_far(&mut prepared.record);
-    Some(describe(&prepared, outliers))
-}
-
-/// Whether the input follows the output, as that of a relay in a loop does and a test signal does not.
-pub(crate) fn is_fed_back(signals: &Signals<'_>, options: &Options) -> bool {
-    prepare(signals, options, FLOOR).is_ok_and(|prepared| {
-        let record = &prepared.record;
-        let samples = (record.len() / ROWS).max(1);
-        validate::follows(&Blocks::new(record, samples, 0.0))
-    })
-}
-
-fn describe(prepared: &Prepared, outliers: usize) -> Recorded {
-    let record = &prepared.record;
-    let deviation = |values: &[f64]| {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let squares = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
-        (squares / values.len() as f64).sqrt()
-    };
-    let outputs: Vec<f64> = record.present_outputs().collect();
-    let present = outputs.len();
-    Recorded {
-        start_s: prepared.start_s,
-        end_s: prepared.start_s + record.time_s(record.len() - 1),
-        sample_s: record.dt_s,
-        samples: present,
-        absent: record.len() - present - outliers,
-        outliers,
-        samples_per_row: 1,
-        hold: record.hold,
-        input_deviation: deviation(&record.input),
-        output_deviation: deviation(&outputs),
-        informative_rad_per_s: None,
-        excited_rad_per_s: None,
-    }
 }

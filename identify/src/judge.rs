@@ -109,10 +109,10 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
         true => None,
         false => Some(relay::steady(&used)),
     };
-    // Nor is a random signal of two levels, whose waves are never alike.
+    // Nor is a test signal of two levels, whose waves may all be different.
     let steady = steady.filter(|found| match found {
         Err(Verdict::NotSteady { .. } | Verdict::Saturated { .. }) => {
-            innovations::is_fed_back(signals, options)
+            innovations::input_follows(signals, options)
         }
         _ => true,
     });

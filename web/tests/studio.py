@@ -671,10 +671,16 @@ def controllers(browser, told):
 
 def in_sight(page, names):
     """Checks that these are on the screen as it is."""
-    width, height = page.evaluate("[innerWidth, innerHeight]")
     for name in names:
-        box = page.locator(name).bounding_box()
-        expect(box and box["y"] >= 0 and box["y"] + box["height"] <= height and box["x"] + box["width"] <= width + 1, f"{name} is at {box}")
+        # In one step of the page: between two of them a plot may be drawn anew, and the old one is nowhere.
+        box = page.evaluate(
+            """(name) => {
+                const { left, top, right, bottom, width } = document.querySelector(name).getBoundingClientRect();
+                return { left, top, right, bottom, seen: width > 0 && top >= 0 && bottom <= innerHeight && right <= innerWidth + 1 };
+            }""",
+            name,
+        )
+        expect(box["seen"], f"{name} is at {box}")
 
 
 def simulated(studio):

@@ -141,7 +141,7 @@ pub(super) struct Limits {
     pub(super) longest_tau_s: f64,
     /// Inverse of the lowest frequency of the excitation (s).
     pub(super) slowest_s: f64,
-    /// Period of the excitation (s).
+    /// Period of the excitation (s). Infinite if there is none.
     pub(super) period_s: f64,
     /// The only structure to fit.
     pub(super) structure: Option<Structure>,
@@ -199,15 +199,16 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
 /// dead time only up to half a period, with the sign of the gain.
 fn aliases(all: &[Candidate], period_s: f64) -> Vec<Theta> {
     let half_s = 0.5 * period_s;
-    let earlier = |found: Candidate| {
-        let mut theta = found.found.theta;
+    let earlier = |mut theta: Theta| {
         let tau = theta.layout().tau();
         let halves = (theta.values[tau] / half_s).round();
-        theta.values[tau] = (theta.values[tau] - halves * half_s).max(0.0);
-        (halves > 0.0).then_some(theta)
+        (halves > 0.0).then(|| {
+            theta.values[tau] = (theta.values[tau] - halves * half_s).max(0.0);
+            theta
+        })
     };
-    (best_of_each(all.to_vec()).into_iter())
-        .filter_map(earlier)
+    let best = best_of_each(all.to_vec()).into_iter();
+    best.filter_map(|found| earlier(found.found.theta))
         .collect()
 }
 

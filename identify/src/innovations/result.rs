@@ -11,7 +11,10 @@ use super::prediction::{Filtering, predict};
 use super::record::Blocks;
 use super::search::Candidate;
 use super::theta::{Bounds, NoiseKind, Theta};
-use crate::outcome::{Alternative, InnovationRow, InnovationTests, Innovations, Noise, Prediction};
+use crate::outcome::{
+    Alternative, Evidence, Fit, FitPoint, InnovationRow, InnovationTests, Innovations, Noise,
+    Prediction,
+};
 
 /// Damping ratio below which a resonance hardly depends on the input.
 const LEAST_ZETA: f64 = 0.005;
@@ -63,8 +66,29 @@ fn noise_of(candidate: &Candidate) -> Noise {
     }
 }
 
+/// The fit as a result. `None` if the filter does not converge.
+pub(super) fn fit(
+    fitted: &Fitted,
+    blocks: &Blocks<'_>,
+    start_s: f64,
+    checked: (InnovationTests, Option<Prediction>, f64),
+) -> Option<Fit> {
+    let explained = checked.1.map_or(1.0, |prediction| prediction.explained);
+    let innovations = innovations(fitted, blocks, start_s, checked)?;
+    let points = innovations.rows.iter().map(|row| FitPoint {
+        time_s: row.time_s,
+        measured: row.measured,
+        fitted: row.simulated,
+    });
+    Some(Fit {
+        misfit: (1.0 - explained).max(0.0).sqrt(),
+        points: points.collect(),
+        evidence: Evidence::Innovations(innovations),
+    })
+}
+
 /// The innovations with their tests, row by row. `None` if the filter does not converge.
-pub(super) fn innovations(
+fn innovations(
     fitted: &Fitted,
     blocks: &Blocks<'_>,
     start_s: f64,

@@ -326,3 +326,29 @@ fn a_short_step_is_one_from_rest_whatever_few_rows_are_before_it() {
         assert!(gain.holds(0.45), "{rest} rows: {gain:?}");
     }
 }
+
+// The gain of a sensor falls with the output, to 0.4 and 0.28 of that at rest. A thrust that falls with the input stood for it, and the
+// gain was not told.
+#[test]
+fn the_curve_of_a_sensor_is_no_thrust() {
+    let levels = [0.0, 0.2, 0.4, 0.1, 0.3, 0.5, 0.2, 0.4];
+    let changes: Vec<(f64, f64)> = (1..levels.len())
+        .map(|k| (400.0 * k as f64, levels[k] - levels[k - 1]))
+        .collect();
+    for curve in [0.005, 0.006] {
+        let mut test = Test::of_process([120.0, 30.0, 2.0, 1.0], &changes, 3200);
+        for y in &mut test.output {
+            *y -= curve * (*y - 22.0).powi(2);
+        }
+        let found = test.identify(&Options::default());
+        let kinds: Vec<&str> = found.remarks.iter().map(Remark::kind).collect();
+        assert!(found.outcome.is_ok(), "{curve}: {kinds:?}");
+        assert!(!kinds.contains(&"nonlinear"), "{curve}: {kinds:?}");
+        let gain = found.outcome.as_ref().unwrap().estimate.get(Parameter::K);
+        let gain = gain.unwrap().estimate.unwrap();
+        assert!(
+            ((1.0 - 120.0 * curve) * 120.0..120.0).contains(&gain),
+            "{gain}"
+        );
+    }
+}

@@ -172,7 +172,7 @@ fn of_record(remark: &Remark) -> Option<String> {
         ),
         Remark::ModelError(share) => format!(
             "The process does more than a model of low order: none explains the recording to its noise. Gain and lags are \
-             those of the fit that comes near to it; what is beside it, {:.0} % of the movement of the output or less, was taken for noise.",
+             those of the fit that comes nearest where errors of {:.0} % of the movement of the output count as noise.",
             100.0 * share
         ),
         Remark::InputLeft(share) => format!(
