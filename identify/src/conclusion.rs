@@ -32,12 +32,13 @@ pub(crate) fn conclude(
         return Err(Verdict::TooUncertain);
     }
     let estimate = posterior.estimate();
-    // A body that is faster than a sample has a gain K, and no acceleration that the samples show.
-    let gain = match estimate.is_below(Parameter::TBody) {
-        true => Parameter::K,
-        false => gain_of(model.structure()),
-    };
-    let width = (estimate.get(gain)).and_then(|interval| interval.relative_half_width());
+    // What the input does in the end, or what it does at first: the controller is robust over the other. A body that is faster than a
+    // sample has no acceleration that the samples show.
+    let width_of = |gain| (estimate.get(gain))?.relative_half_width();
+    let widths = [gain_of(model.structure()), Parameter::K]
+        .into_iter()
+        .filter_map(width_of);
+    let width = widths.min_by(f64::total_cmp);
     if width.is_none_or(|width| width > MOST_WIDTH) {
         return Err(no_information(width.map(|width| width / HALF_WIDTH)));
     }
@@ -86,5 +87,33 @@ mod tests {
         );
         assert_eq!(found.err(), Some(Verdict::TooUncertain));
         assert_eq!(remarks, []);
+    }
+
+    // A lag of 1 to 3 s, of which either the gain at rest or the first slope is the same: a PI holds all of them. If both are unknown,
+    // the gain is not told. The fit, which is asked for last, is left out.
+    #[test]
+    fn either_gain_is_enough() {
+        let outcome = |gains: &dyn Fn(f64, f64) -> f64| {
+            let process = |k: i32| {
+                let (lag_s, own) = (1.0 + f64::from(k) / 20.0, f64::from(k % 8));
+                let lag = Linear::new(Structure::Foptd).with_pole_per_s(1.0 / lag_s);
+                lag.with_gain(gains(lag_s, own)).with_tau_s(0.1)
+            };
+            let draws: Vec<Linear> = (1..=40).map(process).collect();
+            let posterior = Posterior::of_draws(&process(20), &draws);
+            let asked = Specification::new(Form::Pi, Style::Calm);
+            let told = (process(20).into(), posterior);
+            conclude(
+                told,
+                asked,
+                &mut vec![],
+                |_| Verdict::ConstantInput,
+                || None,
+            )
+            .err()
+        };
+        assert_eq!(outcome(&|lag_s, _| 2.0 / lag_s), Some(Verdict::NoFit));
+        assert_eq!(outcome(&|_, _| 2.0), Some(Verdict::NoFit));
+        assert_eq!(outcome(&|_, own| 0.5 + own), Some(Verdict::ConstantInput));
     }
 }

@@ -58,9 +58,9 @@ mod vectors;
 
 use std::f64::consts::FRAC_PI_2;
 
-use onecycle_design::{Design, Parameter, Structure};
+use onecycle_design::{Design, Linear, Parameter, Structure};
 
-use self::before_fit::describe;
+use self::before_fit::{describe, first_answer_s, mirrored_s};
 pub(crate) use self::before_fit::{input_follows, recorded};
 use self::choose::NEARLY;
 use self::fitted::{Disturbances, Fitted};
@@ -101,39 +101,104 @@ const FITTED: f64 = 0.8;
 const TESTED: f64 = 0.85;
 
 /// Identifies the process from a record of any input: as near to its samples as their noise allows, or as near as a model of low order
-/// comes.
-pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
-    let found = identify_to(FLOOR, signals, options);
+/// comes; with the shorter of two dead times that explain it, or with that of the `sign` of the gain which the feedback of a relay tells:
+/// zero if it hardly does, `None` without a relay.
+pub(crate) fn identify(
+    signals: &Signals<'_>,
+    options: &Options,
+    sign: Option<f64>,
+) -> Identification {
+    let found = identify_to(FLOOR, f64::INFINITY, signals, options);
     // The parts of a flight log are many, and another one may be better.
-    if options.is_under_way || !(found.outcome.as_ref()).is_err_and(Verdict::is_of_fit) {
+    if options.is_under_way {
         return found;
     }
-    let mut nearly = identify_to(BELIEVED_LESS, signals, options);
-    if !is_beyond_doubt(&nearly) {
-        return found;
-    }
-    nearly.remarks.push(Remark::ModelError(BELIEVED_LESS));
-    nearly
-}
-
-/// Whether the model of a fit that leaves more than noise predicts well, with a dead time of less than a quarter of the longest period:
-/// one of half a period stands for the other sign of the gain.
-fn is_beyond_doubt(found: &Identification) -> bool {
-    let (Ok(identified), Some(Excitation::Recorded(of))) = (&found.outcome, found.excitation)
-    else {
-        return false;
+    let answer_s = first_answer_s(signals, options).unwrap_or(f64::INFINITY);
+    let longest_tau_s = told_tau_s(&found).min(answer_s);
+    let has_sign = |of: &Identified| sign.is_none_or(|sign| sign * of.model.linear().gain() >= 0.0);
+    let is_longer = |of: &Identified, tau_s: f64| of.model.linear().tau_s() > tau_s;
+    let outcome = found.outcome.as_ref();
+    let is_of_fit = outcome.is_err_and(Verdict::is_of_fit);
+    let has_other_sign = outcome.is_ok_and(|of| !has_sign(of));
+    let is_long = sign.is_none() && outcome.is_ok_and(|of| is_longer(of, longest_tau_s));
+    let contradicts_start = is_long && outcome.is_ok_and(|of| is_longer(of, answer_s));
+    let tries: &[f64] = match (is_of_fit, has_other_sign || is_long) {
+        (true, _) => &[BELIEVED_LESS],
+        (_, true) => &[FLOOR, BELIEVED_LESS],
+        _ => &[],
     };
-    let prediction = (identified.fit.innovations()).and_then(|fit| fit.prediction);
-    let lowest_rad_per_s = of.informative_rad_per_s.map_or(0.0, |band| band.0);
-    prediction.is_some_and(|prediction| prediction.is_good())
-        && identified.model.linear().tau_s() * lowest_rad_per_s < FRAC_PI_2
+    for &believed in tries {
+        let mut other = identify_to(believed, longest_tau_s, signals, options);
+        let is_nearly = believed > FLOOR;
+        if other.outcome.as_ref().is_ok_and(has_sign)
+            && (is_beyond_doubt(&other) || contradicts_start && !is_nearly)
+        {
+            if is_nearly {
+                other.remarks.push(Remark::ModelError(believed));
+            }
+            return other;
+        }
+    }
+    let has_two = |of: &Identified| {
+        mirrored_s(signals, options).is_some_and(|half_s| lasts_s(&of.model.linear()) > half_s)
+    };
+    match has_other_sign || is_long && found.outcome.as_ref().is_ok_and(has_two) {
+        true => without_sign(found),
+        false => found,
+    }
 }
 
-/// Identifies the process, where samples are believed to this share of the movement of the output.
-fn identify_to(believed: f64, signals: &Signals<'_>, options: &Options) -> Identification {
+/// Dead time and lags (s) of a process: another dead time that is too short by less than its lags explains nearly as much.
+fn lasts_s(process: &Linear) -> f64 {
+    let body_s = match process.pole_per_s() {
+        pole_per_s if pole_per_s > 0.0 => 1.0 / pole_per_s,
+        _ => 0.0,
+    };
+    process.tau_s() + process.lags_s().iter().sum::<f64>() + body_s
+}
+
+/// The refusal of a result whose gain may have the other sign.
+fn without_sign(mut found: Identification) -> Identification {
+    found.outcome = found.outcome.and_then(|identified| {
+        let Identified { model, fit, .. } = identified;
+        found.refused = Some(Refused { model, fit });
+        Err(Verdict::SignNotTold)
+    });
+    found
+}
+
+/// Longest dead time that is told from a shorter one (s): a quarter of the longest period. In an input of one period, half a period of
+/// dead time is the other sign of the gain.
+fn told_tau_s(found: &Identification) -> f64 {
+    let band = match found.excitation {
+        Some(Excitation::Recorded(of)) => of.informative_rad_per_s,
+        _ => None,
+    };
+    band.map_or(f64::INFINITY, |(lowest_rad_per_s, _)| {
+        FRAC_PI_2 / lowest_rad_per_s
+    })
+}
+
+/// Whether the model of another try predicts well, with a dead time that is told.
+fn is_beyond_doubt(found: &Identification) -> bool {
+    found.outcome.as_ref().is_ok_and(|identified| {
+        let prediction = (identified.fit.innovations()).and_then(|fit| fit.prediction);
+        prediction.is_some_and(|prediction| prediction.is_good())
+            && identified.model.linear().tau_s() <= told_tau_s(found)
+    })
+}
+
+/// Identifies the process, where samples are believed to this share of the movement of the output, with a dead time up to this (s).
+fn identify_to(
+    believed: f64,
+    longest_tau_s: f64,
+    signals: &Signals<'_>,
+    options: &Options,
+) -> Identification {
     let mut search = Search {
         options,
         believed,
+        longest_tau_s,
         excitation: None,
         refused: None,
         remarks: vec![],
@@ -162,6 +227,8 @@ struct Search<'a> {
     options: &'a Options,
     /// Share of the movement of the output to which a sample is believed.
     believed: f64,
+    /// Longest dead time to look for (s).
+    longest_tau_s: f64,
     excitation: Option<Recorded>,
     refused: Option<Refused>,
     remarks: Vec<Remark>,
@@ -175,6 +242,7 @@ impl Search<'_> {
             .check()
             .map_err(Verdict::NoController)?;
         let mut prepared = prepare(signals, self.options, self.believed)?;
+        prepared.longest_tau_s = prepared.longest_tau_s.min(self.longest_tau_s);
         let outliers = outliers::mark_far(&mut prepared.record);
         self.excitation = Some(describe(&prepared, outliers));
         if let Some(filter) = prepared.filter {
@@ -322,7 +390,11 @@ impl Search<'_> {
         let theta = &fitted.best.found.theta;
         let gain = |component: &Component| component.laplace.gain_deviation(&component.found);
         let deviation = components.first().map(gain).filter(|v| v.is_finite());
-        if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
+        // A process that comes to rest has another gain, which the draws tell.
+        let is_told = deviation.is_some_and(|deviation| {
+            deviation <= MOST_DEVIATION || gain_of(theta.structure) != Parameter::K
+        });
+        if !is_told {
             return Some(self.no_information(theta, deviation));
         }
         let bounds = Bounds::new(theta, blocks, fitted.limits.longest_tau_s);

@@ -10,7 +10,8 @@ use onecycle_design::Parameter;
 /// Relative standard deviation of the gain. Above: `no_information`. Judgement: with two deviations
 /// the gain is wrong by more than half.
 pub(crate) const MOST_DEVIATION: f64 = 0.3;
-/// Half width of the 90 % interval of the gain over the estimate. Above: `no_information`. Judgement: as [`MOST_DEVIATION`].
+/// Half width of the 90 % interval over the estimate, of the gain at rest and of the first slope. Both above: `no_information`. Judgement: as
+/// [`MOST_DEVIATION`].
 pub(crate) const MOST_WIDTH: f64 = 0.5;
 /// Share of the input's power in the informative band. Below: `no_information`. Argument: such a fit rests on rounding errors, as
 /// that of a sine does which has nothing to do with the output; a relay has 0.1 % beyond its 140th harmonic.

@@ -89,6 +89,8 @@ pub enum Verdict {
         /// Frequency (rad/s) up to which an excitation would tell the lags and the dead time.
         needed_rad_per_s: f64,
     },
+    /// Of two dead times half a period apart, with gains of opposite signs, neither is told from the other.
+    SignNotTold,
     /// The best fit lies on a bound of this parameter.
     AtBound(Parameter),
     /// The model does not predict data that it was not fitted to.
@@ -164,7 +166,7 @@ impl Verdict {
             Self::ConstantOutput => "no_response",
             Self::Units => "unusable_units",
             Self::TooShort { .. } | Self::TooCoarse { .. } | Self::TooFewRows { .. } => "too_short",
-            Self::NoInformation { .. } => "no_information",
+            Self::NoInformation { .. } | Self::SignNotTold => "no_information",
             Self::NotSteady { .. } => "not_steady",
             Self::Saturated { .. } => "saturated",
             Self::NotThisProcess { .. }
@@ -212,6 +214,7 @@ impl fmt::Display for Verdict {
             | Self::NoController(_) => self.write_model(f),
             Self::TooFewRows { .. }
             | Self::NoInformation { .. }
+            | Self::SignNotTold
             | Self::AtBound(_)
             | Self::NoPrediction { .. }
             | Self::SetPointLeft { .. }
@@ -316,6 +319,9 @@ impl Verdict {
                 f,
                 "no information: the recording does not tell {}",
                 gain_or(*parameter)
+            ),
+            Self::SignNotTold => f.write_str(
+                "no information: the gain may have either sign, with half a period of the input more or less dead time",
             ),
             Self::AtBound(parameter) => write!(
                 f,

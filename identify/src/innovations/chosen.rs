@@ -200,7 +200,7 @@ fn choose_on(
     let length_s = part.time_s(part.len() - 1);
     let limits = Limits {
         skip_s: limits.skip_s.max(SKIPPED * length_s),
-        longest_tau_s: LONGEST_TAU * length_s,
+        longest_tau_s: limits.longest_tau_s.min(LONGEST_TAU * length_s),
         slowest_s,
         period_s,
         ..*limits

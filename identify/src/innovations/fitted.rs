@@ -11,7 +11,7 @@ use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, Theta};
-use super::{LONGEST_TAU, forces, outliers, output_error, unstable, validate};
+use super::{forces, outliers, output_error, unstable, validate};
 use crate::assumed::RecordedLoop;
 use crate::outcome::Prediction;
 use crate::progress;
@@ -72,11 +72,9 @@ impl Fitted {
         remarks: &mut Vec<Remark>,
     ) -> Result<Self, Verdict> {
         let mut record = prepared.record.clone();
-        let length_s = record.time_s(record.len() - 1);
-        let longest = LONGEST_TAU * length_s;
         let mut limits = Limits {
             skip_s: 0.0,
-            longest_tau_s: longest,
+            longest_tau_s: prepared.longest_tau_s,
             slowest_s: f64::INFINITY,
             period_s: f64::INFINITY,
             structure: options.structure,
@@ -110,7 +108,7 @@ impl Fitted {
         let blocks = Blocks::new(&record, samples, limits.skip_s);
         // Not one that explains less: its limit is the best fit, so it is in another basin.
         let wider = (choice.wider(best.structure()))
-            .and_then(|wider| search::fit(&blocks, &wider.found.theta, longest))
+            .and_then(|wider| search::fit(&blocks, &wider.found.theta, limits.longest_tau_s))
             .filter(|wider| wider.log_likelihood() > best.log_likelihood() - NEARLY);
         let mut fitted = Self {
             part,
@@ -130,7 +128,7 @@ impl Fitted {
         let without = output_error::instead(
             &fitted.blocks(),
             &fitted.best,
-            (options.is_fed_back, longest),
+            (options.is_fed_back, limits.longest_tau_s),
         );
         if let Some((found, is_refuted)) = without {
             fitted.replace_by(found, is_refuted);

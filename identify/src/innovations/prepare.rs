@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use onecycle_design::LowPass;
 
+use super::LONGEST_TAU;
 use super::orthogonal::Orthogonal;
 use super::record::{Forces, Hold, Record};
 use super::unfilter::{alike_smooth, unfilter};
@@ -49,6 +50,8 @@ pub(super) struct Prepared {
     pub(super) filter: Option<LowPass>,
     /// Standard deviation of the rounding of an output that repeats more often than it changes (output unit); zero for others.
     pub(super) rounding: f64,
+    /// Longest dead time to look for (s).
+    pub(super) longest_tau_s: f64,
 }
 
 /// Record of the longest part of the recording without a gap, within the span of `options`. `believed`: share of the movement of the
@@ -93,6 +96,7 @@ pub(super) fn prepare(
     record.rest = rest;
     let (rounding, sharing) = rounding(&record);
     record.floor = (believed * movement(&record)).max(rounding * sharing.sqrt());
+    let longest_tau_s = LONGEST_TAU * record.time_s(record.len() - 1);
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -104,6 +108,7 @@ pub(super) fn prepare(
             .and(options.output_filter_hz)
             .map(LowPass::second_order),
         rounding: if sharing > 1.0 { rounding } else { 0.0 },
+        longest_tau_s,
     })
 }
 

@@ -352,3 +352,40 @@ fn the_curve_of_a_sensor_is_no_thrust() {
         );
     }
 }
+
+/// A square wave of half periods of 100 s, and the output that a lag of 10 s answers to it after a dead time; negative: before it.
+fn square_wave(tau_s: f64) -> Test {
+    let changes = |late_s: f64| -> Vec<(f64, f64)> {
+        let size = |k: i32| {
+            if k == 0 {
+                1.0
+            } else {
+                2.0 * f64::from(1 - 2 * (k % 2))
+            }
+        };
+        (0..30)
+            .map(|k| (100.0 * f64::from(k) + late_s, size(k)))
+            .collect()
+    };
+    let process = [20.0, 10.0, 0.01, 0.0];
+    Test {
+        input: Test::of_process(process, &changes(20.0), 2900).input,
+        ..Test::of_process(process, &changes(20.0 + tau_s), 2900)
+    }
+}
+
+// An output that is logged 5 s before its input is that of the other sign after 95 s, or of any half period more. A dead time of 60 s is
+// one: with the other sign the output would begin 40 s before its input.
+#[test]
+fn half_a_period_of_dead_time_is_the_other_sign() {
+    let found = square_wave(-5.0).identify(&Options::default());
+    assert_eq!(found.outcome.unwrap_err(), Verdict::SignNotTold);
+    let found = square_wave(60.0).identify(&Options::default());
+    let estimate = found.outcome.unwrap().estimate;
+    let of = |parameter| estimate.get(parameter).unwrap().estimate.unwrap();
+    let (gain, tau_s) = (of(Parameter::K), of(Parameter::Tau));
+    assert!(
+        (gain - 20.0).abs() < 0.1 && (tau_s - 60.0).abs() < 0.1,
+        "{gain} {tau_s}"
+    );
+}

@@ -24,6 +24,7 @@ pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
         | Verdict::UnstableInForce
         | Verdict::UnstableProcess { .. }
         | Verdict::NothingGrows
+        | Verdict::SignNotTold
         | Verdict::InputLeft { .. } => of_record(verdict).into(),
         Verdict::SetPointLeft { .. } => of_record(verdict).into(),
         Verdict::OutputLeads { .. } | Verdict::OfController => of_record(verdict).into(),
@@ -126,6 +127,9 @@ fn of_record(verdict: &Verdict) -> &'static str {
         Verdict::UnstableProcess { .. } => {
             "If you know that it is, as of a magnet that holds a ball, `unstable` fits a model with an unstable pole; keep the \
              controller that runs. If it is not, look for a second input, or a drift that the controller follows."
+        }
+        Verdict::SignNotTold => {
+            "Hold the levels of the input for different times, or begin with a single step from rest."
         }
         Verdict::NothingGrows => {
             "Leave `unstable` out; if the process is unstable, record at least 300 rows in closed loop, at even times and with quick \
@@ -294,6 +298,7 @@ mod tests {
             Verdict::OfController,
             Verdict::UnstableProcess { growth_per_s: 56.0 },
             Verdict::NothingGrows,
+            Verdict::SignNotTold,
             Verdict::NoController(DesignError::Structure(crate::Structure::Foptd)),
             Verdict::NoController(DesignError::PhaseMargin(2.0)),
         ];
