@@ -50,17 +50,16 @@ mod search;
 mod starts;
 mod system;
 mod theta;
+mod tries;
 mod unfilter;
 mod unstable;
 mod validate;
 #[cfg(test)]
 mod vectors;
 
-use std::f64::consts::FRAC_PI_2;
+use onecycle_design::{Design, Parameter, Structure};
 
-use onecycle_design::{Design, Linear, Parameter, Structure};
-
-use self::before_fit::{describe, first_answer_s, mirrored_s};
+use self::before_fit::describe;
 pub(crate) use self::before_fit::{input_follows, recorded};
 use self::choose::NEARLY;
 use self::fitted::{Disturbances, Fitted};
@@ -73,6 +72,7 @@ use self::record::{Blocks, Record};
 pub(crate) use self::result::gain_of;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
+pub(crate) use self::tries::identify;
 pub(crate) use self::validate::is_left_to_the_input;
 use crate::assumed::recorded_filter;
 use crate::conclusion::conclude;
@@ -85,8 +85,8 @@ use crate::remarks;
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::thresholds::{
-    ANOTHER_KIND, BELIEVED_LESS, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED,
-    MOST_DEVIATION, MOST_ERROR_RATIO, MOST_TAKEN, STRONGLY_COLOURED, WELL_PREDICTED,
+    ANOTHER_KIND, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED, MOST_DEVIATION,
+    MOST_ERROR_RATIO, MOST_TAKEN, STRONGLY_COLOURED, WELL_PREDICTED,
 };
 use crate::verdict::Verdict;
 
@@ -99,94 +99,6 @@ pub(crate) const ROWS: usize = 1200;
 /// Shares of the time after the fit and after its tests, without the controller: of hover, flight and heater recordings.
 const FITTED: f64 = 0.8;
 const TESTED: f64 = 0.85;
-
-/// Identifies the process from a record of any input: as near to its samples as their noise allows, or as near as a model of low order
-/// comes; with the shorter of two dead times that explain it, or with that of the `sign` of the gain which the feedback of a relay tells:
-/// zero if it hardly does, `None` without a relay.
-pub(crate) fn identify(
-    signals: &Signals<'_>,
-    options: &Options,
-    sign: Option<f64>,
-) -> Identification {
-    let found = identify_to(FLOOR, f64::INFINITY, signals, options);
-    // The parts of a flight log are many, and another one may be better.
-    if options.is_under_way {
-        return found;
-    }
-    let answer_s = first_answer_s(signals, options).unwrap_or(f64::INFINITY);
-    let longest_tau_s = told_tau_s(&found).min(answer_s);
-    let has_sign = |of: &Identified| sign.is_none_or(|sign| sign * of.model.linear().gain() >= 0.0);
-    let is_longer = |of: &Identified, tau_s: f64| of.model.linear().tau_s() > tau_s;
-    let outcome = found.outcome.as_ref();
-    let is_of_fit = outcome.is_err_and(Verdict::is_of_fit);
-    let has_other_sign = outcome.is_ok_and(|of| !has_sign(of));
-    let is_long = sign.is_none() && outcome.is_ok_and(|of| is_longer(of, longest_tau_s));
-    let contradicts_start = is_long && outcome.is_ok_and(|of| is_longer(of, answer_s));
-    let tries: &[f64] = match (is_of_fit, has_other_sign || is_long) {
-        (true, _) => &[BELIEVED_LESS],
-        (_, true) => &[FLOOR, BELIEVED_LESS],
-        _ => &[],
-    };
-    for &believed in tries {
-        let mut other = identify_to(believed, longest_tau_s, signals, options);
-        let is_nearly = believed > FLOOR;
-        if other.outcome.as_ref().is_ok_and(has_sign)
-            && (is_beyond_doubt(&other) || contradicts_start && !is_nearly)
-        {
-            if is_nearly {
-                other.remarks.push(Remark::ModelError(believed));
-            }
-            return other;
-        }
-    }
-    let has_two = |of: &Identified| {
-        mirrored_s(signals, options).is_some_and(|half_s| lasts_s(&of.model.linear()) > half_s)
-    };
-    match has_other_sign || is_long && found.outcome.as_ref().is_ok_and(has_two) {
-        true => without_sign(found),
-        false => found,
-    }
-}
-
-/// Dead time and lags (s) of a process: another dead time that is too short by less than its lags explains nearly as much.
-fn lasts_s(process: &Linear) -> f64 {
-    let body_s = match process.pole_per_s() {
-        pole_per_s if pole_per_s > 0.0 => 1.0 / pole_per_s,
-        _ => 0.0,
-    };
-    process.tau_s() + process.lags_s().iter().sum::<f64>() + body_s
-}
-
-/// The refusal of a result whose gain may have the other sign.
-fn without_sign(mut found: Identification) -> Identification {
-    found.outcome = found.outcome.and_then(|identified| {
-        let Identified { model, fit, .. } = identified;
-        found.refused = Some(Refused { model, fit });
-        Err(Verdict::SignNotTold)
-    });
-    found
-}
-
-/// Longest dead time that is told from a shorter one (s): a quarter of the longest period. In an input of one period, half a period of
-/// dead time is the other sign of the gain.
-fn told_tau_s(found: &Identification) -> f64 {
-    let band = match found.excitation {
-        Some(Excitation::Recorded(of)) => of.informative_rad_per_s,
-        _ => None,
-    };
-    band.map_or(f64::INFINITY, |(lowest_rad_per_s, _)| {
-        FRAC_PI_2 / lowest_rad_per_s
-    })
-}
-
-/// Whether the model of another try predicts well, with a dead time that is told.
-fn is_beyond_doubt(found: &Identification) -> bool {
-    found.outcome.as_ref().is_ok_and(|identified| {
-        let prediction = (identified.fit.innovations()).and_then(|fit| fit.prediction);
-        prediction.is_some_and(|prediction| prediction.is_good())
-            && identified.model.linear().tau_s() <= told_tau_s(found)
-    })
-}
 
 /// Identifies the process, where samples are believed to this share of the movement of the output, with a dead time up to this (s).
 fn identify_to(

@@ -111,9 +111,7 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
     };
     // Nor is a test signal of two levels, whose waves may all be different.
     let steady = steady.filter(|found| match found {
-        Err(Verdict::NotSteady { .. } | Verdict::Saturated { .. }) => {
-            innovations::input_follows(signals, options)
-        }
+        Err(verdict) if is_of_oscillation(verdict) => innovations::input_follows(signals, options),
         _ => true,
     });
     let final_verdict = match &steady {
@@ -123,15 +121,11 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
     if let Some(verdict) = final_verdict {
         return Identification::refused(verdict);
     }
-    let settles = settles(&used);
     let is_relay = steady.as_ref().is_some_and(|found| match found {
-        Ok(_) => !settles,
-        Err(verdict) => matches!(
-            verdict,
-            Verdict::NotSteady { .. } | Verdict::Saturated { .. }
-        ),
+        Ok(_) => !settles(&used),
+        Err(verdict) => is_of_oscillation(verdict),
     });
-    let sign = is_relay.then(|| sign_of_gain(&used));
+    let sign = is_relay.then(|| relay::sign_of_gain(&used));
     let mut found = innovations::identify(signals, options, sign);
     // Who states that the process is unstable knows that a controller holds it, which may be a relay.
     match steady.filter(|_| !options.is_unstable) {
@@ -159,6 +153,14 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
         _ => {}
     }
     found
+}
+
+/// Whether a relay oscillates, though not so that its cycles are alike and whole.
+fn is_of_oscillation(verdict: &Verdict) -> bool {
+    matches!(
+        verdict,
+        Verdict::NotSteady { .. } | Verdict::Saturated { .. }
+    )
 }
 
 /// Whether no estimator can do better: the columns are swapped, or the output is clipped.
@@ -200,34 +202,6 @@ fn settles(signals: &Signals<'_>) -> bool {
     };
     let settled: Vec<bool> = changes.windows(2).filter_map(settled).collect();
     4 * settled.iter().filter(|settled| **settled).count() > 3 * settled.len()
-}
-
-/// Sign of the gain of a process that a relay makes oscillate: with a positive one the output falls where the input goes high, whatever
-/// the law of the relay is. Zero if it does not move there for certain.
-fn sign_of_gain(signals: &Signals<'_>) -> f64 {
-    /// Part of a phase over which the output moves, and the deviations of the mean movement that are certain.
-    const PART: f64 = 0.05;
-    const CERTAIN: f64 = 3.0;
-    let (input, output) = (signals.input, signals.output);
-    let (low, high) = range(input);
-    let is_high = |row: usize| input[row] > 0.5 * (low + high);
-    let switches: Vec<usize> = (1..input.len())
-        .filter(|row| is_high(*row) != is_high(row - 1))
-        .collect();
-    let moved = switches.windows(2).map(|pair| {
-        let rows = (PART * (pair[1] - pair[0]) as f64).ceil() as usize;
-        let rise = output[pair[1]] - output[pair[1] - rows];
-        if is_high(pair[1]) { -rise } else { rise }
-    });
-    let moved: Vec<f64> = moved.collect();
-    let (sum, squares) = (moved.iter()).fold((0.0, 0.0), |(sum, squares), value| {
-        (sum + value, squares + value * value)
-    });
-    // Deviation of the sum, of movements whose mean may be zero.
-    match sum.abs() > CERTAIN * squares.sqrt() {
-        true => sum.signum(),
-        false => 0.0,
-    }
 }
 
 /// Whether a signal mostly repeats its value exactly, as a command does that is held and a measurement does not.
@@ -280,39 +254,4 @@ fn is_oscillating(found: &Identification) -> bool {
     (found.outcome.as_ref().ok())
         .and_then(|found| zeta(&found.model))
         .is_some_and(|zeta| zeta < 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Levels of 100 rows, the first one high.
-    fn square(row: i32) -> f64 {
-        if row.rem_euclid(200) < 100 { 1.0 } else { -1.0 }
-    }
-
-    // Relays of both directions that oscillate with an integrator (a triangle that turns with the input), and with a dead time of half a
-    // period. An output at rest tells nothing.
-    #[test]
-    fn the_law_of_a_relay_has_the_sign_of_the_gain() {
-        let triangle = |row: i32| (0..row).map(square).sum::<f64>();
-        let delayed = |row: i32| square(row - 99);
-        let resting = |row: i32| square(row - 30);
-        let waves: [(&dyn Fn(i32) -> f64, f64); 3] =
-            [(&triangle, 1.0), (&delayed, 1.0), (&resting, 0.0)];
-        for ((wave, sign), side) in waves.into_iter().flat_map(|of| [(of, 1.0), (of, -1.0)]) {
-            let input: Vec<f64> = (0..2000).map(square).collect();
-            let output: Vec<f64> = (0..2000).map(|row| 5.0 + side * wave(row)).collect();
-            let time_s: Vec<f64> = (0..2000).map(f64::from).collect();
-            let signals = Signals {
-                time_s: &time_s,
-                input: &input,
-                output: &output,
-                samples_per_point: 1,
-                sample_period_s: 1.0,
-                breaks: &[],
-            };
-            assert_eq!(sign_of_gain(&signals), side * sign);
-        }
-    }
 }

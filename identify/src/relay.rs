@@ -29,6 +29,7 @@ use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{PriorKnowledge, RefineError, Refined, ShapePrior, refine_with};
 
 use self::input::{RelayInput, find_relay};
+pub(crate) use self::law::sign_of_gain;
 use self::oscillation::{FitWindow, Past, Stretch};
 use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Oscillation};

@@ -37,7 +37,8 @@ pub(crate) const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// a model explains them, two are answered, both rightly.
 pub(crate) const BELIEVED_LESS: f64 = 0.03;
 /// Share of the distance of the proposed loop from instability that the response to the input takes for certain, beyond the model's,
-/// where [`LEFT`] is exceeded and after [`BELIEVED_LESS`]. Above: `not_this_process`. Argument: the peak of the sensitivity is twice the one that is promised.
+/// where [`LEFT`] is exceeded and after [`BELIEVED_LESS`]. Above: `not_this_process`. Argument: the peak of the sensitivity is twice the
+/// one that is promised.
 pub(crate) const MOST_TAKEN: f64 = 0.5;
 /// F statistic of twenty past inputs in the innovations of a relay test, of 1,200 rows. Above: refused. Argument: chance exceeds it
 /// once in a hundred records.

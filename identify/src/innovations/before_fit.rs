@@ -16,24 +16,31 @@ pub(crate) fn recorded(signals: &Signals<'_>, options: &Options) -> Option<Recor
     Some(describe(&prepared, outliers))
 }
 
+/// What `ask` answers for the rows of a recording. `None` if no fit can be made.
+fn of_rows<T>(
+    signals: &Signals<'_>,
+    options: &Options,
+    ask: impl FnOnce(&Blocks<'_>) -> T,
+) -> Option<T> {
+    let record = prepare(signals, options, FLOOR).ok()?.record;
+    let samples = (record.len() / ROWS).max(1);
+    Some(ask(&Blocks::new(&record, samples, 0.0)))
+}
+
 /// Whether past outputs explain the input, as they do that of a relay in a loop, and not a test signal of two levels.
 pub(crate) fn input_follows(signals: &Signals<'_>, options: &Options) -> bool {
-    prepare(signals, options, FLOOR).is_ok_and(|prepared| {
-        let record = &prepared.record;
-        let samples = (record.len() / ROWS).max(1);
-        validate::follows(&Blocks::new(record, samples, 0.0))
-    })
+    of_rows(signals, options, validate::follows).is_some_and(|follows| follows)
 }
 
 /// Time (s) from the first change of the input to that of the output, of a record that begins with both at rest: a dead time is not
 /// longer. `None` for another record.
 pub(super) fn first_answer_s(signals: &Signals<'_>, options: &Options) -> Option<f64> {
-    /// Share of the range of a signal from which it has left its first value, and that of the output over which its fastest movement
-    /// would have shown while it was at rest.
-    const LEFT: f64 = BELIEVED_LESS;
+    of_rows(signals, options, answer_of_rows_s)?
+}
+
+fn answer_of_rows_s(blocks: &Blocks<'_>) -> Option<f64> {
+    /// Share of the range of the output over which its fastest movement would have shown while it was at rest.
     const SHOWN: f64 = 1.0 / 3.0;
-    let record = prepare(signals, options, FLOOR).ok()?.record;
-    let blocks = Blocks::new(&record, (record.len() / ROWS).max(1), 0.0);
     // An output at rest that repeats its value has no new samples.
     let known = (0..blocks.len()).find_map(|row| blocks.mean_output(row))?;
     let of_row = |last: &mut f64, row: usize| {
@@ -41,34 +48,32 @@ pub(super) fn first_answer_s(signals: &Signals<'_>, options: &Options) -> Option
         Some(*last)
     };
     let outputs: Vec<f64> = (0..blocks.len()).scan(known, of_row).collect();
-    let inputs = blocks.mean_inputs();
     let left = |values: &[f64]| {
         let (low, high) = range(values);
-        let first = *values.first()?;
-        (values.iter()).position(|value| (value - first).abs() > LEFT * (high - low))
+        let is_left = |value: &f64| (value - values[0]).abs() > BELIEVED_LESS * (high - low);
+        values.iter().position(is_left)
     };
-    let (changed, answered) = (left(&inputs)?, left(&outputs)?);
+    let (changed, answered) = (left(&blocks.mean_inputs())?, left(&outputs)?);
     let (low, high) = range(&outputs);
     let moved = outputs
         .windows(answered + 1)
         .map(|part| (part[answered] - part[0]).abs());
-    let most = moved.fold(0.0, f64::max);
-    let is_at_rest = most > SHOWN * (high - low);
+    let is_at_rest = moved.fold(0.0, f64::max) > SHOWN * (high - low);
     (changed < answered && is_at_rest).then(|| (answered - changed + 1) as f64 * blocks.block_s())
 }
 
 /// Time (s) after which the input is its own negative, over two periods or more, as that of a square wave or a sine: half a period, of which
 /// the dead time is the other sign of the gain. `None` of another input.
 pub(super) fn mirrored_s(signals: &Signals<'_>, options: &Options) -> Option<f64> {
-    let record = prepare(signals, options, FLOOR).ok()?.record;
-    let blocks = Blocks::new(&record, (record.len() / ROWS).max(1), 0.0);
-    let inputs = validate::centred(blocks.mean_inputs().into_iter());
-    let correlation = |lag: usize| {
-        let (later, earlier) = (&inputs[lag..], &inputs[..inputs.len() - lag]);
-        dot(later, earlier) / (dot(later, later) * dot(earlier, earlier)).sqrt()
-    };
-    let lag = (1..=inputs.len() / 4).find(|lag| correlation(*lag) < BELIEVED_LESS - 1.0)?;
-    Some(lag as f64 * blocks.block_s())
+    of_rows(signals, options, |blocks| {
+        let inputs = validate::centred(blocks.mean_inputs().into_iter());
+        let correlation = |lag: usize| {
+            let (later, earlier) = (&inputs[lag..], &inputs[..inputs.len() - lag]);
+            dot(later, earlier) / (dot(later, later) * dot(earlier, earlier)).sqrt()
+        };
+        let lag = (1..=inputs.len() / 4).find(|lag| correlation(*lag) < BELIEVED_LESS - 1.0)?;
+        Some(lag as f64 * blocks.block_s())
+    })?
 }
 
 /// Measured properties of a record without its `outliers`.

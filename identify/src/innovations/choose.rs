@@ -141,7 +141,7 @@ pub(super) struct Limits {
     pub(super) longest_tau_s: f64,
     /// Inverse of the lowest frequency of the excitation (s).
     pub(super) slowest_s: f64,
-    /// Period of the excitation (s). Infinite if there is none.
+    /// Period (s) of the frequency below and above which the input has half of its power each. Infinite for an input that never changes.
     pub(super) period_s: f64,
     /// The only structure to fit.
     pub(super) structure: Option<Structure>,

@@ -248,3 +248,67 @@ fn value_at_zero(m: &[f64; 5], p: &[f64; 3]) -> f64 {
     let determinant = m[0] * minors[0] - m[1] * minors[1] + m[2] * minors[2];
     (p[0] * minors[0] - p[1] * minors[1] + p[2] * minors[2]) / determinant
 }
+
+/// Sign of the gain of a process that a relay makes oscillate: with a positive one the output rises until the input goes low, whatever the
+/// law of the relay is. Zero if it does not move there for certain.
+pub(crate) fn sign_of_gain(signals: &Signals<'_>) -> f64 {
+    /// Part of a phase over which the output moves, and the deviations of the sum of all movements that are certain.
+    const PART: f64 = 0.05;
+    const CERTAIN: f64 = 3.0;
+    let Ok(relay) = find_relay(signals) else {
+        return 0.0;
+    };
+    let levels: Vec<bool> = relay.levels(&signals.input[relay.span.clone()]).collect();
+    let output = &signals.output[relay.span.clone()];
+    let phases: Vec<&[bool]> = levels.chunk_by(|a, b| a == b).collect();
+    let mut end = phases.first().map_or(0, |phase| phase.len());
+    let (mut sum, mut squares) = (0.0, 0.0);
+    // The first phase has no beginning, the last one no end.
+    for phase in phases.iter().take(phases.len().saturating_sub(1)).skip(1) {
+        end += phase.len();
+        let rows = (PART * phase.len() as f64).ceil() as usize;
+        let rise = output[end] - output[end - rows];
+        sum += if phase[0] { rise } else { -rise };
+        squares += rise * rise;
+    }
+    // Deviation of a sum of movements whose mean may be zero: the root of their squares.
+    match sum.abs() > CERTAIN * squares.sqrt() {
+        true => sum.signum(),
+        false => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Levels of 100 rows, the first one high.
+    fn square(row: i32) -> f64 {
+        if row.rem_euclid(200) < 100 { 1.0 } else { -1.0 }
+    }
+
+    // Relays of both directions that oscillate with an integrator (a triangle that turns with the input), and with a dead time of half a
+    // period. An output at rest tells nothing.
+    #[test]
+    fn the_law_of_a_relay_has_the_sign_of_the_gain() {
+        let triangle = |row: i32| (0..row).map(square).sum::<f64>();
+        let delayed = |row: i32| square(row - 99);
+        let resting = |row: i32| square(row - 30);
+        let waves: [(&dyn Fn(i32) -> f64, f64); 3] =
+            [(&triangle, 1.0), (&delayed, 1.0), (&resting, 0.0)];
+        for ((wave, sign), side) in waves.into_iter().flat_map(|of| [(of, 1.0), (of, -1.0)]) {
+            let input: Vec<f64> = (0..2000).map(square).collect();
+            let output: Vec<f64> = (0..2000).map(|row| 5.0 + side * wave(row)).collect();
+            let time_s: Vec<f64> = (0..2000).map(f64::from).collect();
+            let signals = Signals {
+                time_s: &time_s,
+                input: &input,
+                output: &output,
+                samples_per_point: 1,
+                sample_period_s: 1.0,
+                breaks: &[],
+            };
+            assert_eq!(sign_of_gain(&signals), side * sign);
+        }
+    }
+}
