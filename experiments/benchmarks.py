@@ -13,7 +13,7 @@ output has the date, the revision, the machine and its load, the seed of each ca
 each command; each table prints its own spread. With --write a Markdown table of the output replaces the next table with the same
 head behind the command, in each page that has both.
 
-Commands of cargo on the research run in its folder. With --quick the programs of the development build run campaigns and benchmarks of a few cases. Tests
+Commands of cargo on the research run in its folder. With --quick campaigns and benchmarks have a few cases. Tests
 are listed (at least one must carry the name); benches and examples must be targets of their crate;
 scripts, recipes and options must exist. The status is 1 if a command fails.
 """
@@ -260,7 +260,7 @@ def main():
     parser.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    programs = [target / ("debug" if arguments.quick else "release") / name for name in BUILT]
+    programs = [target / "release" / name for name in BUILT]
     for program in programs:
         if not program.exists():
             sys.exit(f"there is no {program}: build it as README.md says")

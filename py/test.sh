@@ -10,17 +10,16 @@ python="$target/py-venv/bin/python"
 "$python" -m pip install -q -r py/requirements-test.txt
 if [ -z "${ONECYCLE:-}" ]; then
     # With a test: only then has num-complex the feature `std`, as in the package, and the last bits of a peak are the same.
-    cargo build -q -p onecycle-cli --bin onecycle --test it
-    ONECYCLE="$target/debug/onecycle"
+    cargo build -q --release -p onecycle-cli --bin onecycle --test it
+    ONECYCLE="$target/release/onecycle"
 fi
 if [ -z "${ONECYCLE_LAB:-}" ]; then
-    cargo build -q --manifest-path research/Cargo.toml --bin onecycle-lab
-    ONECYCLE_LAB="$target/debug/onecycle-lab"
+    cargo build -q --release --manifest-path research/Cargo.toml --bin onecycle-lab
+    ONECYCLE_LAB="$target/release/onecycle-lab"
 fi
 wheels="$target/py-wheels"
 rm -rf "$wheels"
-# The profile of the tests: no link-time optimisation.
-PYTHON="$python" py/wheel.sh py "$ONECYCLE" "$wheels" --profile dev -q
-PYTHON="$python" py/wheel.sh research/py "$ONECYCLE_LAB" "$wheels" --profile dev -q
+PYTHON="$python" py/wheel.sh py "$ONECYCLE" "$wheels" --release -q
+PYTHON="$python" py/wheel.sh research/py "$ONECYCLE_LAB" "$wheels" --release -q
 "$python" -m pip install -q --force-reinstall --no-deps "$wheels"/*.whl
 ONECYCLE_WHEELS="$wheels" ONECYCLE="$ONECYCLE" ONECYCLE_LAB="$ONECYCLE_LAB" "$python" -m pytest -q py/tests "$@"

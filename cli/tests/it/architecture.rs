@@ -263,7 +263,7 @@ fn both_workspaces_are_built_alike() {
     let (ships, research) = (settings(""), settings("research/"));
     assert_eq!(ships.difference(&research).count(), 0, "{ships:?}");
     let mut own = research.difference(&ships);
-    assert!(own.all(|table| table.starts_with("profile.dev.package.")));
+    assert!(own.all(|table| table.starts_with("profile.release.package.onecycle-lab")));
 }
 
 #[test]

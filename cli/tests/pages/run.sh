@@ -16,8 +16,8 @@ trap 'rm -rf "$scratch"' EXIT
 
 cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --bin onecycle --target-dir "$target"
 if [[ -z ${ONECYCLE_LAB:-} ]]; then
-    cargo build --quiet --locked --manifest-path "$root/research/Cargo.toml" --bin onecycle-lab --target-dir "$target"
-    ONECYCLE_LAB=$target/debug/onecycle-lab
+    cargo build --quiet --release --locked --manifest-path "$root/research/Cargo.toml" --bin onecycle-lab --target-dir "$target"
+    ONECYCLE_LAB=$target/release/onecycle-lab
 fi
 if [[ -z ${PYTHON:-} ]]; then
     python3 -m venv "$scratch/venv"
