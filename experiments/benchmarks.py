@@ -13,9 +13,9 @@ output has the date, the revision, the machine and its load, the seed of each ca
 each command; each table prints its own spread. With --write a Markdown table of the output replaces the next table with the same
 head behind the command, in each page that has both.
 
-Commands of cargo on the research run in its folder. With --quick campaigns and benchmarks have a few cases. Tests
-are listed (at least one must carry the name); benches and examples must be targets of their crate;
-scripts, recipes and options must exist. The status is 1 if a command fails.
+Commands of cargo on the research run in its folder. With --quick campaigns and benchmarks have a few cases; tests are listed (at least
+one must carry the name); benches and examples must be targets of their crate; scripts, recipes and options must exist. The status is 1
+if a command fails.
 """
 
 import argparse

@@ -9,8 +9,7 @@ python3 -m venv "$target/py-venv"
 python="$target/py-venv/bin/python"
 "$python" -m pip install -q -r py/requirements-test.txt
 if [ -z "${ONECYCLE:-}" ]; then
-    # With a test: only then has num-complex the feature `std`, as in the package, and the last bits of a peak are the same.
-    cargo build -q --release -p onecycle-cli --bin onecycle --test it
+    cargo build -q --release --bin onecycle
     ONECYCLE="$target/release/onecycle"
 fi
 if [ -z "${ONECYCLE_LAB:-}" ]; then

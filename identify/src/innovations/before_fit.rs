@@ -29,7 +29,7 @@ fn of_rows<T>(
 
 /// Whether past outputs explain the input, as they do that of a relay in a loop, and not a test signal of two levels.
 pub(crate) fn input_follows(signals: &Signals<'_>, options: &Options) -> bool {
-    of_rows(signals, options, validate::follows).is_some_and(|follows| follows)
+    of_rows(signals, options, validate::follows) == Some(true)
 }
 
 /// Time (s) from the first change of the input to that of the output, of a record that begins with both at rest: a dead time is not
