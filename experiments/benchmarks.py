@@ -155,7 +155,7 @@ def quick(command, environment, scratch):
     if words[:2] == ["cargo", "test"]:
         where = workspace(words)
         words = of_workspace([word for word in words if word not in ("--release", "--ignored", "--nocapture")])
-        listed = words + ([] if "--" in words else ["--"]) + ["--list"]
+        listed = [*words[:2], "--release", *words[2:], *([] if "--" in words else ["--"]), "--list"]
         made = subprocess.run(listed, cwd=where, capture_output=True, text=True)
         return None if re.search(r": test$", made.stdout, re.M) else "no test has this name"
     if words[0] not in BUILT:

@@ -334,6 +334,20 @@ def test_a_lost_scheduler_is_a_sentence_and_the_next_one_goes_on(recipe, tmp_pat
         ended(run, worker, scheduler)
 
 
+def test_a_connection_that_times_out_is_a_lost_scheduler():
+    from onecycle import _cluster
+
+    class Gone:
+        def run(self, *_, **__):
+            return {}
+
+        def nthreads(self):
+            raise OSError("Timed out trying to connect to tcp://192.0.2.2:8786 after 30 s")
+
+    with pytest.raises(onecycle.OnecycleError, match="^the scheduler is lost"):
+        _cluster._spread(Gone(), lambda threads: None, lambda task: (), lambda task, made: None)
+
+
 def test_ctrl_c_ends_a_campaign_that_is_resumed(recipe, tmp_path, client):
     words = [sys.executable, "-m", "onecycle.campaign", recipe, "--scheduler", client.scheduler.address, "--out", tmp_path / "out"]
     words = [str(word) for word in [*words, "--shard", 1]]

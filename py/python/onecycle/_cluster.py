@@ -153,9 +153,16 @@ def _spread(client: Client, tasks: Callable[[int], Any], work: Callable[[Any], t
             left_out[worker] = sentence
             warnings.warn(f"{sentence}: it is left out; install the same packages on both", stacklevel=2)
 
+    def asked(question: Callable[..., Any], *words: Any, **named: Any) -> Any:
+        """What the scheduler answers. A connection that times out raises a plain `OSError`, which a file that cannot be kept raises too."""
+        try:
+            return question(*words, **named)
+        except OSError as error:
+            raise CommClosedError(str(error)) from error
+
     def workers() -> dict[str, int]:
         """Threads of the workers that there are now, which come and go."""
-        there: dict[str, int] = client.nthreads()
+        there: dict[str, int] = asked(client.nthreads)
         kept = {worker: threads for worker, threads in there.items() if worker not in left_out}
         if there and not kept:
             raise _onecycle.OnecycleError(f"{next(iter(left_out.values()))}, and no other worker is left: install the same packages on both")
@@ -175,7 +182,7 @@ def _spread(client: Client, tasks: Callable[[int], Any], work: Callable[[Any], t
         return made
 
     try:
-        for worker, of in client.run(build, on_error="return").items():
+        for worker, of in asked(client.run, build, on_error="return").items():
             if sentence := _difference(build(), of, worker):
                 leave_out(worker, sentence)
         futures: Any = distributed.as_completed(following())  # type: ignore[no-untyped-call]
