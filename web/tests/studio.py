@@ -450,8 +450,9 @@ def stretch(studio, told):
     studio.drop("log", path)
     page.select_option("#loop", "roll rate")
     studio.rest()
-    studio.until("document.querySelector('#signals-0 svg')?.getBoundingClientRect().width > 0", limit_s=20)
-    box = page.locator("#signals-0 svg").bounding_box()
+    # Until they are drawn.
+    page.evaluate("reading")
+    box = box_of(page, "#signals-0 svg")
     page.mouse.move(box["x"] + 0.2 * box["width"], box["y"] + 60)
     page.mouse.down()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60, steps=4)
@@ -669,18 +670,18 @@ def controllers(browser, told):
     print("controllers with gains of their own: as the program gives them")
 
 
+def box_of(page, name):
+    """Where this is on the screen, in one step of the page: between two of them a plot may be drawn anew, and the old one is nowhere."""
+    return page.evaluate("(name) => document.querySelector(name).getBoundingClientRect().toJSON()", name)
+
+
 def in_sight(page, names):
     """Checks that these are on the screen as it is."""
+    width, height = page.evaluate("[innerWidth, innerHeight]")
     for name in names:
-        # In one step of the page: between two of them a plot may be drawn anew, and the old one is nowhere.
-        box = page.evaluate(
-            """(name) => {
-                const { left, top, right, bottom, width } = document.querySelector(name).getBoundingClientRect();
-                return { left, top, right, bottom, seen: width > 0 && top >= 0 && bottom <= innerHeight && right <= innerWidth + 1 };
-            }""",
-            name,
-        )
-        expect(box["seen"], f"{name} is at {box}")
+        box = box_of(page, name)
+        seen = box["width"] > 0 and box["top"] >= 0 and box["bottom"] <= height and box["right"] <= width + 1
+        expect(seen, f"{name} is at {box}")
 
 
 def simulated(studio):
