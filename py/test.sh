@@ -21,4 +21,4 @@ rm -rf "$wheels"
 PYTHON="$python" py/wheel.sh py "$ONECYCLE" "$wheels" --release -q
 PYTHON="$python" py/wheel.sh research/py "$ONECYCLE_LAB" "$wheels" --release -q
 "$python" -m pip install -q --force-reinstall --no-deps "$wheels"/*.whl
-ONECYCLE_WHEELS="$wheels" ONECYCLE="$ONECYCLE" ONECYCLE_LAB="$ONECYCLE_LAB" "$python" -m pytest -q py/tests "$@"
+ONECYCLE_WHEELS="$wheels" ONECYCLE="$ONECYCLE" ONECYCLE_LAB="$ONECYCLE_LAB" "$python" -m pytest -q -n auto --dist loadfile py/tests "$@"
