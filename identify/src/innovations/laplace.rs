@@ -33,8 +33,6 @@ pub(super) struct Laplace {
     /// Factor on the standard deviation of each unknown if the residual is not white: square root of the ratio of the
     /// sandwich estimator's variance (Newey and West's weights) to the plain one.
     pub(super) coloured: Vec<f64>,
-    /// Box of the search.
-    pub(super) bounds: Bounds,
 }
 
 impl Laplace {
@@ -102,19 +100,14 @@ impl Laplace {
             near,
             slopes,
             coloured,
-            bounds: *bounds,
         })
     }
 
-    /// Relative standard deviation of the gain; where lags are nearly equal, of the gain times their [`NearLags::symmetric`].
+    /// Relative standard deviation of the gain; where lags are nearly equal, of the gain times [`NearLags::symmetric`].
     pub(super) fn gain_deviation(&self, found: &Found) -> f64 {
         let (at, symmetric) = (&found.at, self.near.symmetric(&found.theta));
         let n = self.free.len();
-        // That of the gain times the factor of the pole, less that of the factor.
-        let slope = |i: usize| {
-            let of_factor = self.near.slope_of_alone(&found.theta, self.free[i]);
-            self.slopes[i][0] - symmetric * at.gain * of_factor
-        };
+        let slope = |i: usize| self.slopes[i][0];
         let through: f64 = (0..n * n)
             .map(|k| slope(k / n) * self.covariance[k / n][k % n] * slope(k % n))
             .sum();
