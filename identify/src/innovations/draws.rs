@@ -240,8 +240,10 @@ impl Root {
             .collect();
         let covariance = |i: usize, j: usize| factors[i] * factors[j] * laplace.covariance[i][j];
         let near = &laplace.near;
-        let (mut theta, has_complex_poles) =
+        let (theta, has_complex_poles) =
             near.moved(&found.theta, &laplace.free, &mut changes, covariance);
+        // A Gaussian has no end: a body of a thousandth of a sample, or a dead time of ten records.
+        let mut theta = laplace.bounds.clamp(&theta);
         let symmetric = near.symmetric(&found.theta);
         for (slope, change) in laplace.slopes.iter().zip(&changes) {
             gain += slope[0] * change / symmetric;

@@ -33,6 +33,8 @@ pub(super) struct Laplace {
     /// Factor on the standard deviation of each unknown if the residual is not white: square root of the ratio of the
     /// sandwich estimator's variance (Newey and West's weights) to the plain one.
     pub(super) coloured: Vec<f64>,
+    /// Box of the search.
+    pub(super) bounds: Bounds,
 }
 
 impl Laplace {
@@ -100,6 +102,7 @@ impl Laplace {
             near,
             slopes,
             coloured,
+            bounds: *bounds,
         })
     }
 
