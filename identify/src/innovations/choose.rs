@@ -80,6 +80,17 @@ impl Choice {
         Some(damped.unwrap_or(simplest))
     }
 
+    /// The same without the structures that have a second-order stage.
+    pub(super) fn without_pairs(&self) -> Self {
+        let has_none = |of: &&Candidate| of.structure().stages().pairs == 0;
+        let of = |all: &[Candidate]| all.iter().filter(has_none).cloned().collect();
+        Self {
+            candidates: of(&self.candidates),
+            all: of(&self.all),
+            samples: self.samples,
+        }
+    }
+
     /// Candidates up to `span` behind the best.
     pub(super) fn within(&self, span: f64) -> impl Iterator<Item = &Candidate> {
         let best = self.candidates.first().map_or(0.0, |best| best.bic);

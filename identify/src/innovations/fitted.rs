@@ -72,7 +72,7 @@ impl Fitted {
         remarks: &mut Vec<Remark>,
     ) -> Result<Self, Verdict> {
         let mut record = prepared.record.clone();
-        let mut limits = Limits {
+        let limits = Limits {
             skip_s: 0.0,
             longest_tau_s: prepared.longest_tau_s,
             slowest_s: f64::INFINITY,
@@ -83,7 +83,30 @@ impl Fitted {
         let choice = progress::part(0.0..CHOSEN, || {
             choose_start(&mut record, &limits, options, remarks)
         });
-        let (mut part, mut choice) = choice.ok_or(Verdict::NoFit)?;
+        let (part, choice) = choice.ok_or(Verdict::NoFit)?;
+        let known = remarks.len();
+        let slower = choice.without_pairs();
+        let fit = |record: Record, choice: Choice, remarks: &mut Vec<Remark>| {
+            Self::of_choice(record, (part.clone(), choice), limits, options, remarks)
+        };
+        let mut fitted = fit(record.clone(), choice, remarks)?;
+        // What is faster than the samples show is dead time or a lag.
+        if options.structure.is_none() && fitted.has_fastest_pair() && slower.chosen().is_some() {
+            remarks.truncate(known);
+            fitted = fit(record, slower, remarks)?;
+        }
+        fitted.outliers += outliers;
+        Ok(fitted)
+    }
+
+    /// Step 3: the fit of the structure that is chosen to finer rows.
+    fn of_choice(
+        mut record: Record,
+        (mut part, mut choice): (Range<usize>, Choice),
+        mut limits: Limits,
+        options: &Options,
+        remarks: &mut Vec<Remark>,
+    ) -> Result<Self, Verdict> {
         let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
         let (mut samples, skip_s) = rows_for(&record, &theta);
         limits.skip_s = skip_s;
@@ -119,7 +142,7 @@ impl Fitted {
             best,
             disturbances: Disturbances::Kept,
             prediction: None,
-            outliers: outliers + found,
+            outliers: found,
             record,
         };
         if let Some(remark) = fitted.add_forces() {
@@ -184,6 +207,11 @@ impl Fitted {
         };
         fitted.prediction = fitted.prediction_by(&fitted.best.found.theta);
         Ok(fitted)
+    }
+
+    fn has_fastest_pair(&self) -> bool {
+        let theta = &self.best.found.theta;
+        Bounds::new(theta, &self.blocks(), self.limits.longest_tau_s).has_fastest_pair(theta)
     }
 
     pub(super) fn blocks(&self) -> Blocks<'_> {

@@ -106,11 +106,15 @@ impl Laplace {
         })
     }
 
-    /// Relative standard deviation of the gain; where lags are nearly equal, of the gain times [`NearLags::symmetric`].
+    /// Relative standard deviation of the gain; where lags are nearly equal, of the gain times their [`NearLags::symmetric`].
     pub(super) fn gain_deviation(&self, found: &Found) -> f64 {
         let (at, symmetric) = (&found.at, self.near.symmetric(&found.theta));
         let n = self.free.len();
-        let slope = |i: usize| self.slopes[i][0];
+        // That of the gain times the factor of the pole, less that of the factor.
+        let slope = |i: usize| {
+            let of_factor = self.near.slope_of_alone(&found.theta, self.free[i]);
+            self.slopes[i][0] - symmetric * at.gain * of_factor
+        };
         let through: f64 = (0..n * n)
             .map(|k| slope(k / n) * self.covariance[k / n][k % n] * slope(k % n))
             .sum();

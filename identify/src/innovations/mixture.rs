@@ -63,15 +63,15 @@ fn process(theta: &Theta) -> Vec<usize> {
     (0..=theta.layout().tau()).collect()
 }
 
-/// The lags of a fit that are nearly equal. All components have the coordinates of the best one: volumes in others do not
+/// The lags of a fit that are nearly equal, and its pole. All components have the coordinates of the best one: volumes in others do not
 /// compare.
-fn near_lags(found: &Found) -> NearLags {
-    NearLags::of(&found.theta, &process(&found.theta))
+fn near_lags(blocks: &Blocks<'_>, found: &Found) -> NearLags {
+    NearLags::of(&found.theta, &process(&found.theta), blocks.length_s())
 }
 
 /// The one component of a fit. `None` if the unknowns have no joint maximum.
 pub(super) fn of_one(blocks: &Blocks<'_>, found: &Found, bounds: &Bounds) -> Option<Component> {
-    let point = Point::of(blocks, found.clone(), &near_lags(found), bounds)?;
+    let point = Point::of(blocks, found.clone(), &near_lags(blocks, found), bounds)?;
     Some(Component {
         weight: 1.0,
         found: point.found,
@@ -81,7 +81,7 @@ pub(super) fn of_one(blocks: &Blocks<'_>, found: &Found, bounds: &Bounds) -> Opt
 
 /// Components about the best fit. Empty if the unknowns have no joint maximum.
 pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec<Component> {
-    let near = near_lags(best);
+    let near = near_lags(blocks, best);
     let Some(centre) = Point::of(blocks, best.clone(), &near, bounds) else {
         return vec![];
     };

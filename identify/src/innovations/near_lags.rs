@@ -11,11 +11,16 @@
 //! `4 p^3 >= 27 r^2`. At the boundary two of them are equal: `x = s, s, -2 s`, `p = 3 s^2`, `r = -2 s^3`. Beyond it are complex
 //! poles, which only a structure with a second-order stage has. The pole of the body counts as a lag `1/a`, a second-order stage
 //! as two. A gain in front of these is not symmetric in the lags, but over the product of the lags of the actuator it is.
+//!
+//! A pole `a` that is no such lag has the coordinate `asinh(a t)`, with a twelfth `t` of the length of the record: of a body that comes
+//! to rest well within the record that is the logarithm of its time constant, which no error makes negative; of a slower one the pole
+//! itself, which may be that of an integrator. Over `sqrt(a^2 + 1/t^2)` the gain is that at rest, or that of an integrator.
 
 use std::f64::consts::{LN_2, PI};
 
 use num_complex::Complex64;
 
+use super::search::LAGS_IN_A_RECORD;
 use super::theta::{MOST, Theta};
 
 /// Difference of `ln T` below which lags are nearly equal: a factor of 2. Beyond it their logarithms are as good.
@@ -26,20 +31,32 @@ const STEPS: [f64; 3] = [1e-4, 5e-3, 5e-4];
 const POINTS: i32 = 30;
 const REFINEMENTS: usize = 40;
 
-/// The unknowns of a fit whose lags are nearly equal. Empty if no two are.
+/// The unknowns of a fit whose lags are nearly equal, and of its pole.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NearLags {
-    /// In the order of descending lags: of the body, then of the actuator.
+    /// Empty if no two lags are nearly equal. In the order of descending lags: of the body, then of the actuator.
     members: Vec<usize>,
     /// The pole of the body, if it is a member.
     pole: Option<usize>,
     /// `c1` of the second-order stage, if that is a member.
     pair: Option<usize>,
+    /// The pole of the body, if it is no member, and the rate below which it may be that of an integrator (1/s).
+    alone: Option<(usize, f64)>,
 }
 
 impl NearLags {
-    /// Those of the unknowns `free`.
-    pub(super) fn of(theta: &Theta, free: &[usize]) -> Self {
+    /// Those of the unknowns `free` of a record of this length.
+    pub(super) fn of(theta: &Theta, free: &[usize], length_s: f64) -> Self {
+        let near = Self::nearly_equal(theta, free);
+        let pole = theta.layout().pole();
+        let alone = pole.filter(|pole| free.contains(pole) && !near.members.contains(pole));
+        Self {
+            alone: alone.map(|pole| (pole, LAGS_IN_A_RECORD / length_s)),
+            ..near
+        }
+    }
+
+    fn nearly_equal(theta: &Theta, free: &[usize]) -> Self {
         let layout = theta.layout();
         let lags = 0..layout.stages.lags;
         let pole = layout.pole().filter(|pole| theta.values[*pole] > 0.0);
@@ -50,6 +67,7 @@ impl NearLags {
             members: all.filter(|index| free.contains(index)).collect(),
             pole,
             pair,
+            alone: None,
         };
         let logs = all.logs(theta);
         // Of three lags at most one run of neighbours has two.
@@ -69,14 +87,19 @@ impl NearLags {
             pole: pole.filter(|pole| members.contains(pole)),
             members,
             pair,
+            alone: None,
         }
     }
 
-    /// None, unless all of them are among `free`.
+    /// No lags, unless all of them are among `free`; and no pole that is not.
     pub(super) fn within(&self, free: &[usize]) -> Self {
-        match self.members.iter().all(|index| free.contains(index)) {
+        let near = match self.members.iter().all(|index| free.contains(index)) {
             true => self.clone(),
             false => Self::default(),
+        };
+        Self {
+            alone: self.alone.filter(|(pole, _)| free.contains(pole)),
+            ..near
         }
     }
 
@@ -100,14 +123,27 @@ impl NearLags {
             .collect()
     }
 
-    /// Factor that makes the gain and the disturbance symmetric in the lags.
+    /// Factor that makes the gain and the disturbance symmetric in the lags, and those of a body at rest.
     pub(super) fn symmetric(&self, theta: &Theta) -> f64 {
+        if let Some((pole, slowest_per_s)) = self.alone {
+            return 1.0 / theta.values[pole].hypot(slowest_per_s);
+        }
         if self.pole.is_none() && self.pair.is_none() {
             return 1.0;
         }
         let lags = 0..theta.layout().stages.lags;
         let members = lags.filter(|index| self.members.contains(index));
         members.map(|index| (-theta.values[index]).exp()).product()
+    }
+
+    /// Derivative of the logarithm of [`Self::symmetric`] along the coordinate of an unknown: that of a pole that is no member, else zero.
+    pub(super) fn slope_of_alone(&self, theta: &Theta, index: usize) -> f64 {
+        let alone = self.alone.filter(|(pole, _)| *pole == index);
+        // 1/cosh x, of sinh x = a t.
+        alone.map_or(0.0, |(pole, slowest_per_s)| {
+            let pole_per_s = theta.values[pole];
+            -pole_per_s / pole_per_s.hypot(slowest_per_s)
+        })
     }
 
     /// Coordinates: `m`, `p` and `r` take the places of the members in their order.
@@ -121,6 +157,9 @@ impl NearLags {
         for (index, value) in (self.members.iter()).zip([mean.re, 0.5 * squares.re, product.re]) {
             at[*index] = value;
         }
+        if let Some((pole, slowest_per_s)) = self.alone {
+            at[pole] = (at[pole] / slowest_per_s).asinh();
+        }
         at
     }
 
@@ -130,6 +169,9 @@ impl NearLags {
             values: *at,
             ..*template
         };
+        if let Some((pole, slowest_per_s)) = self.alone {
+            theta.values[pole] = slowest_per_s * at[pole].sinh();
+        }
         let value = |place: usize| self.members.get(place).map_or(0.0, |index| at[*index]);
         let (m, p, r) = (value(0), value(1), value(2));
         if let Some(pair) = self.pair {
@@ -166,7 +208,12 @@ impl NearLags {
     pub(super) fn ends(&self, theta: &Theta, index: usize, step: f64) -> ([Theta; 2], f64) {
         let mut at = self.coordinates(theta);
         let place = self.members.iter().position(|member| *member == index);
-        let step = place.map_or(step, |place| STEPS[place]);
+        let is_alone = self.alone.is_some_and(|(pole, _)| pole == index);
+        let step = match place {
+            Some(place) => STEPS[place],
+            None if is_alone => STEPS[0],
+            None => step,
+        };
         let skew = self.members.get(2).map_or(0.0, |index| at[*index].abs());
         if let Some(spread) = self.members.get(1) {
             // Both ends are processes of the structure.
@@ -304,15 +351,15 @@ mod tests {
     fn lags_within_a_factor_of_two_are_near() {
         let near = |body_s: f64| {
             let theta = theta(Structure::Toptd, &[3_f64.ln(), 0.0, 1.0 / body_s, 0.2]);
-            NearLags::of(&theta, &[0, 1, 2, 3]).members
+            NearLags::of(&theta, &[0, 1, 2, 3], 9.0).members
         };
         assert_eq!(near(1.9), [2, 0, 1]);
         assert_eq!(near(1.1), [2, 1]);
         assert_eq!(near(4.0), [2, 0]);
         assert!(near(0.4).is_empty());
         let theta = theta(Structure::Toptd, &[0.1, 0.0, 1.0, 0.2]);
-        assert!(NearLags::of(&theta, &[0, 3]).members.is_empty());
-        assert_eq!(NearLags::of(&theta, &[0, 1, 3]).members, [0, 1]);
+        assert!(NearLags::of(&theta, &[0, 3], 9.0).members.is_empty());
+        assert_eq!(NearLags::of(&theta, &[0, 1, 3], 9.0).members, [0, 1]);
     }
 
     // Two lags, three, and a lag beside complex poles come back.
@@ -325,15 +372,45 @@ mod tests {
             (Structure::Toptd, vec![0.1, 0.1, (-0.1_f64).exp(), 0.2]),
             (Structure::ResonantLag, vec![0.05, 1.7, 0.8, 0.2]),
             (Structure::ResonantLag, vec![-0.4, 2.0, 0.97, 0.2]),
+            (Structure::Foptd, vec![-0.03, 0.2]),
+            (Structure::Toptd, vec![0.1, 0.0, 0.03, 0.2]),
         ] {
             let theta = theta(structure, &values);
             let free: Vec<usize> = (0..values.len()).collect();
-            let near = NearLags::of(&theta, &free);
-            assert!(near.members.len() >= 2, "{structure:?}");
+            let near = NearLags::of(&theta, &free, 9.0);
+            assert!(
+                near.members.len() >= 2 || near.alone.is_some(),
+                "{structure:?}"
+            );
             let back = near.theta(&theta, &near.coordinates(&theta));
             assert!(is_close(&back, &theta), "{back:?} {theta:?}");
             let gain = 2.0 * near.symmetric(&theta) / near.symmetric(&back);
             assert!((gain - 2.0).abs() < 1e-9);
+        }
+    }
+
+    // A time constant of 1 s in a record of 1,200 s, known to a factor of e: its pole stays positive, and the gain at rest is that of the
+    // fit. A pole of a time constant of 1,000 records moves as it is, with the gain of an integrator.
+    #[test]
+    fn a_pole_is_a_time_constant_or_that_of_an_integrator() {
+        for (pole_per_s, change, expected_per_s, ratio) in [
+            (1.0, -1.0, (-1.0_f64).exp(), (-1.0_f64).exp()),
+            (1.0, 2.0, 2.0_f64.exp(), 2.0_f64.exp()),
+            (1e-5, -2e-3, -1e-5, 1.0),
+        ] {
+            let theta = theta(Structure::Foptd, &[pole_per_s, 0.2]);
+            let near = NearLags::of(&theta, &[0, 1], 1200.0);
+            let (moved, _) = near.moved(&theta, &[0], &mut [change], |_, _| 1.0);
+            let found = near.symmetric(&theta) / near.symmetric(&moved);
+            assert!(
+                (moved.values[0] / expected_per_s - 1.0).abs() < 1e-3,
+                "{moved:?}"
+            );
+            assert!((found / ratio - 1.0).abs() < 1e-3, "{found}");
+            let (ends, step) = near.ends(&theta, 0, 1.0);
+            let [low, high] = ends.map(|end| near.symmetric(&end).ln());
+            let slope = near.slope_of_alone(&theta, 0);
+            assert!((slope - (high - low) / step).abs() < 1e-6, "{slope}");
         }
     }
 
@@ -361,7 +438,7 @@ mod tests {
     fn complex_poles_become_the_most_probable_equal_lags() {
         let theta = theta(Structure::Soptd, &[0.0, 1.0, 0.2]);
         let free = [0, 1, 2];
-        let near = NearLags::of(&theta, &free);
+        let near = NearLags::of(&theta, &free, 9.0);
         // m stands in the place of the pole, p in that of the lag.
         let mut changes = [-0.02, 0.01, 0.0];
         let covariance = |i: usize, j: usize| match (i, j) {
@@ -382,7 +459,7 @@ mod tests {
     fn complex_poles_of_three_lags_become_a_double_lag() {
         let theta = theta(Structure::Toptd, &[0.0, 0.0, 1.0, 0.2]);
         let free = [0, 1, 2, 3];
-        let near = NearLags::of(&theta, &free);
+        let near = NearLags::of(&theta, &free, 9.0);
         let covariance = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
         let of = |p: f64, r: f64| {
             let mut changes = [p, r, 0.0, 0.0];

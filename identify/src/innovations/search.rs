@@ -47,6 +47,8 @@ const RACED: usize = 2;
 /// the others with this many of the best processes.
 const NOISES: [f64; 3] = [60.0, 8.0, 300.0];
 const REFINED: usize = 12;
+/// The longest lag of the grid: one over this, as a part of the record. A longer one is hardly told from an integrator's.
+pub(super) const LAGS_IN_A_RECORD: f64 = 12.0;
 
 /// Best point of a structure with a set of noises.
 #[derive(Clone, Debug)]
@@ -287,7 +289,7 @@ fn differ(a: &Theta, b: &Theta, longest_tau_s: f64) -> bool {
 /// Grid of processes: lags and poles from two steps to a twelfth of the record, dead times to 0.4 of the longest.
 fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: f64) -> Vec<Theta> {
     let (dt, length) = (blocks.record.dt_s, blocks.length_s());
-    let (shortest, longest) = (2.0 * dt, length / 12.0);
+    let (shortest, longest) = (2.0 * dt, length / LAGS_IN_A_RECORD);
     let times: Vec<f64> = (0..5)
         .map(|i| shortest * (longest / shortest).powf(f64::from(i) / 4.0))
         .collect();
