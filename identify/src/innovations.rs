@@ -406,7 +406,7 @@ impl Search<'_> {
                 sample_s: fitted.record.dt_s,
                 early_s: prepared.early_s,
                 late_s: self.late_s(&fitted.record),
-                rest: fitted.record.rest.unwrap_or(0.0),
+                rest: fitted.record.rest.map_or(0.0, |rest| rest.input),
             },
             is_wider.then_some(ratio.sqrt()),
         );

@@ -109,6 +109,9 @@ pub enum Remark {
     DriftOrGain,
     /// The input never changes: it is assumed to have been zero before the first row, with the process at rest.
     AssumedRest,
+    /// From another state at the start the step explains nothing: the process is assumed to have been at rest before it, which the few rows
+    /// before it do not tell.
+    RestBeforeStep,
     /// Outputs were left out: lost, stale or outliers. The value is their share.
     Absent(f64),
     /// Only the longest part without a gap was used. The value is its share of the recording.
@@ -258,6 +261,7 @@ impl Remark {
             Self::WeakPrediction { .. } => "weak_prediction",
             Self::DriftOrGain => "drift_or_gain",
             Self::AssumedRest => "assumed_rest",
+            Self::RestBeforeStep => "rest_before_step",
             Self::Absent(_) => "absent",
             Self::PartUsed(_) => "part_used",
             Self::Interpolated(_) => "interpolated",

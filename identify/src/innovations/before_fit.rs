@@ -62,6 +62,32 @@ fn answer_of_rows_s(blocks: &Blocks<'_>) -> Option<f64> {
     (changed < answered && is_at_rest).then(|| (answered - changed + 1) as f64 * blocks.block_s())
 }
 
+/// Whether the output moves before it answers, `tau_s` after the first change of the input: a straight line through these rows has a slope
+/// beyond three of its deviations, of neighbours that are correlated (G. E. P. Box, G. M. Jenkins, "Time Series Analysis" (1976), first
+/// order). Rows that are too few show nothing.
+pub(super) fn moves_before_answer(signals: &Signals<'_>, tau_s: f64) -> bool {
+    const FEWEST: usize = 4;
+    let (input, time_s) = (signals.input, signals.time_s);
+    let first = input.iter().take_while(|value| **value == input[0]).count();
+    let Some(changed_s) = time_s.get(first) else {
+        return false;
+    };
+    let count = first.max(time_s.partition_point(|time_s| *time_s < changed_s + tau_s));
+    if count < FEWEST {
+        return false;
+    }
+    let times = validate::centred(signals.time_s[..count].iter().copied());
+    let outputs = validate::centred(signals.output[..count].iter().copied());
+    let square = dot(&times, &times);
+    let slope = dot(&times, &outputs) / square;
+    let pairs = times.iter().zip(&outputs);
+    let left: Vec<f64> = pairs.map(|(t, y)| y - slope * t).collect();
+    let size = dot(&left, &left);
+    let correlation = (dot(&left[1..], &left[..count - 1]) / size).max(0.0);
+    let variance = size / (count - 2) as f64 / square * (1.0 + correlation) / (1.0 - correlation);
+    slope.powi(2) > 9.0 * variance
+}
+
 /// Time (s) after which the input is its own negative, over two periods or more, as that of a square wave or a sine: half a period, of which
 /// the dead time is the other sign of the gain. `None` of another input.
 pub(super) fn mirrored_s(signals: &Signals<'_>, options: &Options) -> Option<f64> {
@@ -132,6 +158,24 @@ mod tests {
         assert_eq!(of([&step, &moving], first_answer_s), None);
         let early = |row: i32| answer(row + 50);
         assert_eq!(of([&step, &early], first_answer_s), None);
+    }
+
+    // Rest, under noise that is correlated or not, and a drift of 0.02 a row, which 90 rows show and three do not, unless the dead time adds
+    // to them.
+    #[test]
+    fn an_output_that_moves_before_it_answers_was_not_at_rest() {
+        let noise = |row: i32| (12.9898 * f64::from(row)).sin() + (0.3 * f64::from(row)).sin();
+        let moves = |rows: i32, drift: f64, tau_s: f64| {
+            let input = move |row: i32| f64::from(row >= rows);
+            let output = move |row: i32| 0.1 * noise(row) + drift * f64::from(row);
+            of([&input, &output], |signals, _| {
+                moves_before_answer(signals, tau_s)
+            })
+        };
+        for rows in [1, 3, 20, 90] {
+            assert!(!moves(rows, 0.0, 0.0), "{rows}");
+        }
+        assert!(!moves(3, 0.02, 0.0) && moves(90, 0.02, 0.0) && moves(3, 0.02, 9.0));
     }
 
     #[test]

@@ -91,6 +91,18 @@ impl Choice {
         }
     }
 
+    /// Each of the other structures that explain the record nearly as well as the best, alone.
+    pub(super) fn others_than(&self, chosen: Structure) -> impl Iterator<Item = Self> {
+        let others = self.within(NEARLY);
+        others
+            .filter(move |other| other.structure() != chosen)
+            .map(|other| Self {
+                candidates: vec![other.clone()],
+                all: self.all.clone(),
+                samples: self.samples,
+            })
+    }
+
     /// Candidates up to `span` behind the best.
     pub(super) fn within(&self, span: f64) -> impl Iterator<Item = &Candidate> {
         let best = self.candidates.first().map_or(0.0, |best| best.bic);

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::choose::{Choice, Limits, NEARLY, choose};
 use super::likelihood::Evaluation;
-use super::record::{Blocks, Hold, Record};
+use super::record::{Blocks, Hold, Record, Rest};
 use super::search;
 use super::theta::{NoiseKind, Theta};
 use super::{LONGEST_TAU, ROWS, validate};
@@ -50,13 +50,13 @@ pub(super) fn choose_start(
     });
     if record.rest.is_none() && !options.is_under_way {
         let choice = free.as_ref().map(|(_, choice)| choice);
-        let at_rest = record.at_rest().rounded(CHOOSING_STAMP);
+        let at_rest = record.at_rest(true).rounded(CHOOSING_STAMP);
         let mut starts = search::screen_whole(&at_rest, limits.structure, limits.longest_tau_s);
         starts.extend(choice.and_then(Choice::chosen).map(|of| of.found.theta));
         let before = progress::part(FREE..RESTED, || before(record, limits, &starts));
         let mut limits = *limits;
         match before {
-            Before::Rest => *record = record.at_rest(),
+            Before::Rest { may_drift } => *record = record.at_rest(may_drift),
             Before::Another { skip_s } if skip_s > SKIPPED * record.time_s(record.len() - 1) => {
                 limits.skip_s = skip_s;
             }
@@ -77,21 +77,12 @@ pub(super) fn choose_start(
 
 /// What was before a record.
 enum Before {
-    /// Rest under the first input.
-    Rest,
+    /// Rest under the first input, where an integrator may drift or not.
+    Rest { may_drift: bool },
     /// Any state under the first input, or under another one of which nothing shows.
     Unknown,
     /// Another input, whose effect lasts until `skip_s`.
     Another { skip_s: f64 },
-}
-
-/// Whether the input is held at a first level, and ten times as long or longer at a second one.
-fn begins_with_a_step(input: &[f64]) -> bool {
-    let mut levels = input.chunk_by(|a, b| a == b).map(<[f64]>::len);
-    let (first, second) = (levels.next(), levels.next());
-    first
-        .zip(second)
-        .is_some_and(|(first, second)| second >= 10 * first)
 }
 
 /// What explains the beginning of a record best, from each of `thetas`.
@@ -116,7 +107,7 @@ fn before(record: &Record, limits: &Limits, thetas: &[Theta]) -> Before {
         });
         fits.min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let at_rest = least(&record.at_rest());
+    let at_rest = least(&record.at_rest(true));
     let least_bic = |found: Option<(f64, Theta)>| found.map_or(f64::INFINITY, |(bic, _)| bic);
     // Another constant input is one unknown more. What comes of it ends with the dead time: the rows before are as likely as those
     // after it, by chance three deviations of their chi-squared more.
@@ -131,15 +122,14 @@ fn before(record: &Record, limits: &Limits, thetas: &[Theta]) -> Before {
     let at_rest_theta = at_rest.map(|(_, theta)| theta);
     let of_another = thetas.last().into_iter().chain(&at_rest_theta);
     let another = (of_another.filter_map(after)).min_by(|a, b| a.0.total_cmp(&b.0));
-    let (at_rest, unknown) = (least_bic(at_rest), least_bic(least(record)));
     // Few rows before a step hardly tell that they are at rest, but who records one waits for it.
-    let doubt = match begins_with_a_step(&record.input) {
-        true => NEARLY,
-        false => 0.0,
-    };
+    let still = validate::begins_with_a_step(&record.input).then(|| least(&record.at_rest(false)));
+    let still = still.map_or(f64::INFINITY, least_bic);
+    let (at_rest, unknown) = (least_bic(at_rest), least_bic(least(record)));
     match another {
         Some((bic, skip_s)) if bic < at_rest.min(unknown) => Before::Another { skip_s },
-        _ if at_rest < unknown + doubt => Before::Rest,
+        _ if still < at_rest.min(unknown) + NEARLY => Before::Rest { may_drift: false },
+        _ if at_rest < unknown => Before::Rest { may_drift: true },
         _ => Before::Unknown,
     }
 }
@@ -196,7 +186,10 @@ fn choose_on(
     let slowest_s = validate::slowest_s(&samples).unwrap_or(f64::INFINITY);
     let period_s = validate::period_s(&samples).unwrap_or(f64::INFINITY);
     // At rest before the record, at rest where a part begins: the input moves where the part tells most.
-    part.rest = part.rest.or(record.rest.map(|_| part.input[0]));
+    part.rest = part.rest.or(record.rest.map(|_| Rest {
+        input: part.input[0],
+        may_drift: true,
+    }));
     let length_s = part.time_s(part.len() - 1);
     let limits = Limits {
         skip_s: limits.skip_s.max(SKIPPED * length_s),

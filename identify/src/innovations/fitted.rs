@@ -18,7 +18,7 @@ use crate::progress;
 use crate::remark::Remark;
 use crate::settings::Options;
 use crate::signals::range;
-use crate::thresholds::{LEAST_PREDICTED, MOST_ERROR_RATIO};
+use crate::thresholds::{LEAST_PREDICTED, MOST_ERROR_RATIO, WELL_PREDICTED};
 use crate::verdict::Verdict;
 
 /// Rounds of outliers.
@@ -84,17 +84,35 @@ impl Fitted {
             choose_start(&mut record, &limits, options, remarks)
         });
         let (part, choice) = choice.ok_or(Verdict::NoFit)?;
-        let known = remarks.len();
-        let slower = choice.without_pairs();
-        let fit = |record: Record, choice: Choice, remarks: &mut Vec<Remark>| {
-            Self::of_choice(record, (part.clone(), choice), limits, options, remarks)
+        let fit = |choice: Choice| {
+            let mut own = vec![];
+            let start = (part.clone(), choice);
+            Self::of_choice(record.clone(), start, limits, options, &mut own)
+                .map(|fitted| (fitted, own))
         };
-        let mut fitted = fit(record.clone(), choice, remarks)?;
-        // What is faster than the samples show is dead time or a lag.
-        if options.structure.is_none() && fitted.has_fastest_pair() && slower.chosen().is_some() {
-            remarks.truncate(known);
-            fitted = fit(record, slower, remarks)?;
+        let (mut fitted, mut own) = fit(choice.clone())?;
+        if options.structure.is_none() {
+            let without = choice.without_pairs();
+            if fitted.has_no_resonance() && without.chosen().is_some() {
+                (fitted, own) = fit(without)?;
+            }
+            // Of structures that explain the record nearly as well, the one that predicts.
+            if !fitted.predicts_well() && !fitted.is_fed_back(options) {
+                let others = choice.others_than(fitted.best.structure());
+                let fits = others.filter_map(|other| fit(other).ok());
+                let better = fits.filter(|(other, _)| other.explained() >= WELL_PREDICTED);
+                (fitted, own) = better
+                    .reduce(|a, b| {
+                        if b.0.explained() > a.0.explained() {
+                            b
+                        } else {
+                            a
+                        }
+                    })
+                    .unwrap_or((fitted, own));
+            }
         }
+        remarks.append(&mut own);
         fitted.outliers += outliers;
         Ok(fitted)
     }
@@ -209,9 +227,30 @@ impl Fitted {
         Ok(fitted)
     }
 
-    fn has_fastest_pair(&self) -> bool {
+    /// Share of the variance of the last third that a fit to the first two thirds predicts.
+    fn explained(&self) -> f64 {
+        self.prediction
+            .map_or(0.0, |prediction| prediction.explained)
+    }
+
+    fn predicts_well(&self) -> bool {
+        self.prediction.is_none_or(|found| found.is_good())
+    }
+
+    fn is_fed_back(&self, options: &Options) -> bool {
+        options.is_fed_back || validate::is_fed_back(&self.blocks())
+    }
+
+    /// Whether the second-order stage, if there is one, is faster than the samples show, which is dead time or a lag, or holds a lag that
+    /// is longer than the record, which has no gain at rest but a first slope.
+    fn has_no_resonance(&self) -> bool {
         let theta = &self.best.found.theta;
-        Bounds::new(theta, &self.blocks(), self.limits.longest_tau_s).has_fastest_pair(theta)
+        let blocks = self.blocks();
+        let bounds = Bounds::new(theta, &blocks, self.limits.longest_tau_s);
+        let [c1, c0] = theta.process(1.0).pair();
+        let is_real = c1 * c1 > 4.0 * c0;
+        let is_slow = is_real && c0 * blocks.length_s() < c1;
+        theta.structure.stages().pairs > 0 && (is_slow || bounds.has_fastest_pair(theta))
     }
 
     pub(super) fn blocks(&self) -> Blocks<'_> {

@@ -7,7 +7,7 @@ use onecycle_design::LowPass;
 
 use super::LONGEST_TAU;
 use super::orthogonal::Orthogonal;
-use super::record::{Forces, Hold, Record};
+use super::record::{Forces, Hold, Record, Rest};
 use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
 use crate::signals::{Signals, is_constant, rounding_deviation, smallest_step};
@@ -93,7 +93,10 @@ pub(super) fn prepare(
     };
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
-    record.rest = rest;
+    record.rest = rest.map(|input| Rest {
+        input,
+        may_drift: false,
+    });
     let (rounding, sharing) = rounding(&record);
     record.floor = (believed * movement(&record)).max(rounding * sharing.sqrt());
     let longest_tau_s = LONGEST_TAU * record.time_s(record.len() - 1);

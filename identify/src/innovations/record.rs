@@ -42,9 +42,8 @@ pub(crate) struct Record {
     pub(crate) present: Vec<bool>,
     /// Input between the samples.
     pub(crate) hold: Hold,
-    /// Input before the record, under which the process was at rest when the record began. `None`: the state at the start
-    /// is not known.
-    pub(crate) rest: Option<f64>,
+    /// How the process was at rest when the record began. `None`: the state at the start is not known.
+    pub(crate) rest: Option<Rest>,
     /// Nonlinear terms of the model.
     pub(crate) forces: Forces,
     /// Least deviation of the white noise of a sample that is believed (output unit): below it the digits of a file and the errors
@@ -76,6 +75,15 @@ impl Forces {
     pub(crate) fn len(&self) -> usize {
         self.of_rate().count() + usize::from(self.thrust.is_some())
     }
+}
+
+/// Rest before a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rest {
+    /// Input before the record.
+    pub(crate) input: f64,
+    /// Whether the output of an integrator may have moved at a constant rate.
+    pub(crate) may_drift: bool,
 }
 
 impl Record {
@@ -160,9 +168,10 @@ impl Record {
     }
 
     /// The same record of a process that was at rest under the first input.
-    pub(crate) fn at_rest(&self) -> Self {
+    pub(crate) fn at_rest(&self, may_drift: bool) -> Self {
+        let input = self.input[0];
         Self {
-            rest: Some(self.input[0]),
+            rest: Some(Rest { input, may_drift }),
             ..self.clone()
         }
     }

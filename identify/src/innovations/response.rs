@@ -39,7 +39,8 @@ fn with_input<T>(record: &Record, tau_s: f64, with: impl FnOnce(Source<'_>) -> T
     match record.rest {
         None => with(source),
         Some(rest) => {
-            let changes: Vec<f64> = record.input.iter().map(|input| input - rest).collect();
+            let inputs = record.input.iter();
+            let changes: Vec<f64> = inputs.map(|input| input - rest.input).collect();
             with(Source {
                 values: &changes,
                 before: 0.0,
@@ -109,7 +110,7 @@ pub(super) fn of_forces<const N: usize>(
         );
         let lagged = with_input(record, tau_s, |source| outputs(&lag, record, source));
         // The square at rest is a constant, which the disturbance holds.
-        let rest = record.rest.unwrap_or(0.0) - middle;
+        let rest = record.rest.map_or(0.0, |rest| rest.input) - middle;
         let squares: Vec<f64> = (lagged.iter())
             .map(|lagged| (rest + lagged / lag_s).powi(2) - rest * rest)
             .collect();

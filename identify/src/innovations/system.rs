@@ -82,7 +82,7 @@ impl<const N: usize> System<N> {
     /// States that the start may have.
     pub(super) fn start_of(&self, blocks: &Blocks<'_>, theta: &Theta) -> Start<N> {
         match blocks.record.rest {
-            Some(_) => Start::at_rest(theta, self),
+            Some(rest) => Start::at_rest(theta, self, rest.may_drift),
             None => Start::free(),
         }
     }
@@ -140,9 +140,9 @@ impl<const N: usize> Start<N> {
         }
     }
 
-    /// The states at rest under a constant input, which the response to the input leaves out: a constant output, and with an
-    /// integrator a constant rate too. The disturbance is the one that keeps that state.
-    fn at_rest(theta: &Theta, system: &System<N>) -> Self {
+    /// The states at rest under a constant input, which the response to the input leaves out: a constant output, and if that of an
+    /// integrator may drift a constant rate too. The disturbance is the one that keeps that state.
+    fn at_rest(theta: &Theta, system: &System<N>, may_drift: bool) -> Self {
         let stages = theta.structure.stages();
         let [_, c0] = theta.process(1.0).pair();
         let pole = theta.process(1.0).pole_per_s();
@@ -162,6 +162,7 @@ impl<const N: usize> Start<N> {
             (false, integrators) => {
                 column(system.model.output, 0.0);
                 match (stages.poles, integrators) {
+                    _ if !may_drift => {}
                     (0, 1) => column(N - 1, 0.0),
                     (0, _) => column(entry, 0.0),
                     _ => column(entry, pole),

@@ -3,9 +3,9 @@
 use std::cell::LazyCell;
 use std::f64::consts::FRAC_PI_2;
 
-use super::before_fit::{first_answer_s, mirrored_s};
-use super::identify_to;
+use super::before_fit::{first_answer_s, mirrored_s, moves_before_answer};
 use super::prepare::FLOOR;
+use super::{identify_to, validate};
 use crate::excitation::Excitation;
 use crate::outcome::{Identification, Identified, Refused};
 use crate::remark::Remark;
@@ -35,7 +35,10 @@ pub(crate) fn identify(
     options: &Options,
     sign: Option<f64>,
 ) -> Identification {
-    let found = identify_to(FLOOR, f64::INFINITY, signals, options);
+    let mut found = identify_to(FLOOR, f64::INFINITY, signals, options);
+    if found.outcome.is_err() && !options.is_under_way && options.input_before.is_none() {
+        found = from_rest(signals, options).unwrap_or(found);
+    }
     let answer_s = LazyCell::new(|| first_answer_s(signals, options).unwrap_or(f64::INFINITY));
     let has_sign = |of: &Identified| sign.is_none_or(|sign| sign * of.model.linear().gain() >= 0.0);
     let is_longer = |of: &Identified, tau_s: f64| of.model.linear().tau_s() > tau_s;
@@ -71,6 +74,22 @@ pub(crate) fn identify(
         true => without_sign(found),
         false => found,
     }
+}
+
+/// Fit to a record that begins with a step, from rest: from another state at the start the step may explain nothing, but who records one
+/// waits for rest. `None` if the output moves before it answers, or if the fit does not predict well.
+fn from_rest(signals: &Signals<'_>, options: &Options) -> Option<Identification> {
+    if !validate::begins_with_a_step(signals.input) || moves_before_answer(signals, 0.0) {
+        return None;
+    }
+    let at_rest = options.input_before(Some(signals.input[0]));
+    let mut found = identify_to(FLOOR, f64::INFINITY, signals, &at_rest);
+    let moves = |of: &Identified| moves_before_answer(signals, of.model.linear().tau_s());
+    if !is_beyond_doubt(&found) || found.outcome.as_ref().is_ok_and(moves) {
+        return None;
+    }
+    found.remarks.push(Remark::RestBeforeStep);
+    Some(found)
 }
 
 /// Lags (s) of a process. A dead time that is too short by less than them explains nearly as much.

@@ -8,7 +8,7 @@ use super::descent::{Found, Patience};
 use super::likelihood::{Evaluation, input_innovations};
 use super::orthogonal::Orthogonal;
 use super::prediction::{Filtering, predict};
-use super::record::{Blocks, Record};
+use super::record::{Blocks, Record, Rest};
 use super::search;
 use super::theta::Theta;
 use crate::outcome::{InnovationTests, Prediction};
@@ -205,6 +205,15 @@ pub(super) fn follows(blocks: &Blocks<'_>) -> bool {
     explained.is_some_and(|(_, f)| f > FED_BACK)
 }
 
+/// Whether the input is held at a first level, and ten times as long or longer at a second one.
+pub(super) fn begins_with_a_step(input: &[f64]) -> bool {
+    let mut levels = input.chunk_by(|a, b| a == b).map(<[f64]>::len);
+    let (first, second) = (levels.next(), levels.next());
+    first
+        .zip(second)
+        .is_some_and(|(first, second)| second >= 10 * first)
+}
+
 /// Whether an input switches between two levels at least four times: twice from each.
 fn switches(input: &[f64]) -> bool {
     /// Distance from a level, as a share of that between the levels.
@@ -252,6 +261,7 @@ pub(super) fn prediction(
     let measured = |row: usize| whole.mean_output(row);
     let later = blocks.len()..whole.len().saturating_sub(ahead);
     let pairs: Vec<(f64, f64)> = later
+        .clone()
         .filter_map(|row| {
             let predicted = found.ahead[row] + found.forced[row + ahead];
             measured(row + ahead).map(|value| (value, predicted))
@@ -267,7 +277,7 @@ pub(super) fn prediction(
         let present = rows.filter(|row| whole.present(*row) > 0);
         variance(&present.map(|row| found.forced[row]).collect::<Vec<f64>>())
     };
-    let is_calm = forced(blocks.len()..whole.len()) < CALM_END * forced(0..whole.len());
+    let is_calm = forced(later.start + ahead..whole.len()) < CALM_END * forced(0..whole.len());
     let every: Vec<f64> = match is_calm {
         true => (0..whole.len()).filter_map(measured).collect(),
         false => pairs.iter().map(|(value, _)| *value).collect(),
@@ -358,13 +368,12 @@ fn lines(mut rows: Vec<f64>, row_s: f64) -> Vec<(f64, f64)> {
 }
 
 /// Share of the power of the input in a band of frequencies (rad/s), a quarter wider on both sides, over the first 2,000
-/// rows. A step before the first row is not among these, and has power at all frequencies.
+/// rows. A step before the first row is not among these, one in the first rows is under the end of the window, and both have power at
+/// all frequencies.
 pub(super) fn input_share(blocks: &Blocks<'_>, (low, high): (f64, f64)) -> f64 {
-    if blocks
-        .record
-        .rest
-        .is_some_and(|rest| rest != blocks.record.input[0])
-    {
+    let input = &blocks.record.input;
+    let is_step = |rest: Rest| rest.input != input[0] || begins_with_a_step(input);
+    if blocks.record.rest.is_some_and(is_step) {
         return 1.0;
     }
     let lines = lines(blocks.mean_inputs(), blocks.block_s());
@@ -403,7 +412,7 @@ pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
 /// known: a step in the first rows is nearly its own mean.
 pub(super) fn slowest_s(blocks: &Blocks<'_>) -> Option<f64> {
     let inputs = blocks.mean_inputs();
-    let middle = blocks.record.rest.unwrap_or_else(|| mean(&inputs));
+    let middle = (blocks.record.rest).map_or_else(|| mean(&inputs), |rest| rest.input);
     let [low, _, _] = quantiles_about(middle, &inputs, blocks.block_s())?;
     Some(1.0 / low)
 }
@@ -460,8 +469,41 @@ fn quantiles_about(middle: f64, rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::record::Record;
+    use onecycle_design::Structure;
+
     use super::*;
+
+    // A lag of 10 rows that answers 10 steps, and rests from 50 rows after the split on: nothing is left to predict 100 rows ahead, and the
+    // movement of the whole record is the measure.
+    #[test]
+    fn an_end_at_rest_is_predicted() {
+        let input: Vec<f64> = (0..1500)
+            .map(|row| f64::from(u8::from(row < 1000 && row / 100 % 2 == 0)))
+            .collect();
+        let decay = (-0.1_f64).exp();
+        let lagged = input.iter().scan(0.0, |state, input| {
+            let last = *state;
+            *state = input + (*state - input) * decay;
+            Some(if last < 1e-3 { 0.0 } else { last })
+        });
+        let output = lagged.collect();
+        let record = Record {
+            floor: 1e-3,
+            ..Record::even(1.0, input, output)
+        };
+        let mut theta = Theta::new(Structure::Foptd);
+        theta.values[..2].copy_from_slice(&[0.1, 0.0]);
+        let limits = Limits {
+            skip_s: 0.0,
+            longest_tau_s: 100.0,
+            slowest_s: f64::INFINITY,
+            period_s: f64::INFINITY,
+            structure: None,
+            fewest_samples: 1,
+        };
+        let found = prediction(&record, &theta, &limits, 1, 100.0).unwrap();
+        assert!(found.explained > 0.99, "{found:?}");
+    }
 
     // A sine of 5 rad/s has all of its power there; a square wave has 8/(9 pi^2) = 9.0 % in its third harmonic.
     #[test]

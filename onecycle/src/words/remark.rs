@@ -166,6 +166,9 @@ fn of_record(remark: &Remark) -> Option<String> {
         Remark::AssumedRest => "The input never changes. The fit assumes that it was 0 before the first row, with the process \
              at rest: state another value with `input_before`."
             .to_owned(),
+        Remark::RestBeforeStep => "The few rows before the step do not tell whether the process was at rest, which is assumed: \
+             record longer before a step."
+            .to_owned(),
         Remark::Coloured(autocorrelation) => format!(
             "What the model did not predict is not white noise (largest autocorrelation {autocorrelation:.2}): the \
              intervals are widened for it."
@@ -366,6 +369,7 @@ mod tests {
             },
             Remark::DriftOrGain,
             Remark::AssumedRest,
+            Remark::RestBeforeStep,
             Remark::Absent(0.013),
             Remark::PartUsed(0.61),
             Remark::Interpolated(12.0),
