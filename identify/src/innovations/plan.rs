@@ -19,7 +19,7 @@ use crate::outcome::Noise;
 use crate::posterior::Estimate;
 
 /// Parameters of `model` with the 90 % intervals that a record of `input`, sampled every `sample_s`, leads to on average
-/// under `noise`. `None` if the record does not tell the parameters, or has fewer than 60 samples.
+/// under `noise`. `None` if the record does not tell the parameters, or has too few samples.
 ///
 /// The input is that of the process, with the controller's part if a loop is closed. The intervals are those of the
 /// noise alone: an error of the model is not in them.

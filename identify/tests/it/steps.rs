@@ -149,6 +149,54 @@ fn a_tank_is_answered_after_three_rows_of_rest() {
     assert!(assumed > 0);
 }
 
+/// A step in the fourth row of `rows`, the answer of two lags and a dead time that are shares of the record, and noise of 0.5 % of it.
+fn short(rows: i32, seed: u64) -> (Test, f64) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let length = f64::from(rows);
+    let slow_s = random.random_range(0.08..0.2) * length;
+    let gain = random.random_range(10.0..60.0);
+    let process = [
+        gain,
+        slow_s,
+        random.random_range(0.05..0.4) * slow_s,
+        random.random_range(0.0..0.06) * length,
+    ];
+    let mut test = Test::of_process(process, &[(3.0, 1.0)], rows as usize);
+    let mut noise = || (0..12).map(|_| random.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+    for output in &mut test.output {
+        *output += 0.005 * gain * noise();
+    }
+    (test, gain)
+}
+
+// Who logs by hand has no more. From 30 rows on there is an answer, and it is right; of a walk that has nothing to do with the step there
+// is none.
+#[test]
+fn a_short_step_test_is_answered() {
+    for rows in [30, 40, 55] {
+        let found = (0..8).map(|seed| {
+            let (test, gain) = short(rows, seed);
+            let outcome = test.identify(&Options::default()).outcome.ok()?;
+            Some(outcome.estimate.get(Parameter::K)?.estimate? / gain)
+        });
+        let ratios: Vec<f64> = found.flatten().collect();
+        assert!(ratios.len() >= 6, "{rows} rows: {ratios:?}");
+        let is_right = |ratio: &f64| (ratio - 1.0).abs() < 0.15;
+        assert!(ratios.iter().all(is_right), "{rows} rows: {ratios:?}");
+        for seed in 0..8 {
+            let (mut test, _) = short(rows, seed);
+            let mut random = Pcg64Mcg::seed_from_u64(100 + seed);
+            let mut walk = 0.0;
+            for output in &mut test.output {
+                walk += random.random_range(-1.0..1.0);
+                *output = walk + random.random_range(-0.2..0.2);
+            }
+            let found = test.identify(&Options::default());
+            assert!(found.outcome.is_err(), "{rows} rows of a walk, {seed}");
+        }
+    }
+}
+
 // Of a step in the second row the search without rest finds nothing in this structure; at rest there is a fit.
 #[test]
 fn a_stated_structure_is_tried_at_rest_too() {
