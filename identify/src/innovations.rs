@@ -246,12 +246,13 @@ impl Search<'_> {
                 share: tests.input_share,
             });
         }
+        // Without disturbances all errors are coloured.
         let is_coloured = tests.autocorrelation > STRONGLY_COLOURED;
         let is_wrong = explained
-            < if is_coloured {
-                BEYOND_DOUBT
-            } else {
-                LEAST_PREDICTED
+            < match (is_coloured, fitted.disturbances) {
+                (true, Disturbances::Kept) => BEYOND_DOUBT,
+                (true, _) => WELL_PREDICTED,
+                (false, _) => LEAST_PREDICTED,
             };
         match prediction {
             Some(prediction) if is_wrong && ratio > MOST_ERROR_RATIO => {

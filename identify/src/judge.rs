@@ -18,7 +18,7 @@ use crate::outcome::Identification;
 use crate::relay;
 use crate::remark::Remark;
 use crate::settings::Options;
-use crate::signals::{Signals, range};
+use crate::signals::{Signals, is_constant, range};
 use crate::thresholds::{LEAST_SAMPLE_S, MOST_INPUT_F};
 use crate::verdict::Verdict;
 
@@ -96,8 +96,16 @@ fn at_two_amplitudes(
 fn estimated(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) -> Identification {
     match options.of_cycles() {
         Some(cycles) => relay::identify(signals, (options, cycles), pack),
-        None => judged(signals, options),
+        None => judged(&shown(signals, &mut vec![]), options),
     }
+}
+
+/// The rows without a last one in which an input changes that never did before: no output shows what comes of it.
+fn shown<'a>(signals: &'a Signals<'_>, breaks: &'a mut Vec<usize>) -> Signals<'a> {
+    let all = signals.input.len();
+    let last = all.saturating_sub(1);
+    let is_first_change = is_constant(&signals.input[..last]) && !is_constant(signals.input);
+    signals.part(0..if is_first_change { last } else { all }, breaks)
 }
 
 /// The fit of the likelihood, as far as it can be believed.

@@ -52,7 +52,7 @@ pub(crate) const WELL_PREDICTED: f64 = 0.9;
 /// The same. Below, with an error above [`MOST_ERROR_RATIO`]: `not_this_process`. Campaign: `any_open.toml`, 1 %, all of six seconds.
 pub(crate) const LEAST_PREDICTED: f64 = 0.7;
 /// The same. From here coloured innovations are no reason to refuse. Argument: where noise is that small they show errors of the
-/// model that do not matter.
+/// model that do not matter. Of a fit without disturbances, which leaves all errors coloured, from [`WELL_PREDICTED`] on.
 pub(crate) const BEYOND_DOUBT: f64 = 0.98;
 /// Mean square of the prediction's error over what the disturbances explain. Above: see [`WELL_PREDICTED`]. Campaign: as there.
 pub(crate) const EXPECTED_ERROR_RATIO: f64 = 2.0;

@@ -218,6 +218,19 @@ fn a_step_in_the_first_row_is_one_from_zero_or_from_the_stated_input() {
     assert!(!stated.remarks.contains(&Remark::AssumedRest));
 }
 
+// The input of the last row acts after it.
+#[test]
+fn a_change_in_the_last_row_shows_nothing() {
+    let mut test = Test::of(&[(0.0, 0.5)], 3000);
+    let found = test.identify(&Options::default());
+    test.time_s.push(3000.0 * SAMPLE_S);
+    test.input.push(0.0);
+    test.output.push(22.0 + 0.5 * HEATER[0]);
+    let also = test.identify(&Options::default());
+    is_heater(&also, "off in the last row");
+    assert_eq!(found.outcome.ok(), also.outcome.ok());
+}
+
 // Stamps 4 and 3 s apart leave five of seven points of their grid without a sample. The end is calm all the same, and no row of the
 // fit is one without a sample, where the model's mean over none is zero.
 #[test]
