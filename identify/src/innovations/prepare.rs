@@ -157,7 +157,8 @@ fn shared(noise: f64) -> f64 {
 }
 
 /// The gaps in which the input is not known: it differs at both ends, or it may have changed twice in between. Of changes at any time that
-/// has a chance of `(gap / mean time between changes)^2 / 2`, which has to be below 5 %. So all gaps together are shorter than the rest.
+/// has a chance of `(gap / mean time between changes)^2 / 2`, which has to be below 5 %. All of them if the others are longer than what
+/// was recorded: that would be a grid of holes.
 fn unknown_gaps(signals: &Signals<'_>) -> Vec<usize> {
     const SHORT: f64 = 0.3;
     let (input, time_s) = (signals.input, signals.time_s);
@@ -166,9 +167,16 @@ fn unknown_gaps(signals: &Signals<'_>) -> Vec<usize> {
     };
     let levels = input.chunk_by(|a, b| a == b).count();
     let short_s = SHORT * (last_s - first_s) / levels as f64;
-    let is_known = |at: usize| input[at] == input[at - 1] && time_s[at] - time_s[at - 1] < short_s;
-    let gaps = signals.breaks.iter().copied();
-    gaps.filter(|at| !is_known(*at)).collect()
+    let length_s = |at: &usize| time_s[*at] - time_s[*at - 1];
+    let is_known = |at: &usize| input[*at] == input[*at - 1] && length_s(at) < short_s;
+    let (known, unknown): (Vec<usize>, Vec<usize>) =
+        signals.breaks.iter().copied().partition(is_known);
+    let total_s = |gaps: &[usize]| gaps.iter().map(length_s).sum::<f64>();
+    let recorded_s = last_s - first_s - total_s(signals.breaks);
+    if total_s(&known) > recorded_s {
+        return signals.breaks.to_vec();
+    }
+    unknown
 }
 
 /// The longest run of indices of `asked` between gaps.
@@ -595,6 +603,26 @@ mod tests {
         assert_eq!(found.record.input[100..120], [0.0; 20]);
         assert_eq!(found.part_used, 1.0);
         assert_eq!(of_gap(1.0).record.len(), 200);
+    }
+
+    // Bursts of 50 samples at 1 kHz every hour under one input: 14 million steps of the grid.
+    #[test]
+    fn bursts_are_no_grid_of_holes() {
+        let times_s: Vec<f64> = (0..200)
+            .map(|k| 0.001 * f64::from(k) + 3600.0 * f64::from(k / 50))
+            .collect();
+        let signals = Signals {
+            time_s: &times_s,
+            input: &[1.0; 200],
+            output: &ramp(200),
+            samples_per_point: 1,
+            sample_period_s: 0.001,
+            breaks: &[50, 100, 150],
+        };
+        let record = prepare(&signals, &Options::default(), FLOOR)
+            .unwrap()
+            .record;
+        assert_eq!(record.len(), 50);
     }
 
     #[test]
