@@ -79,12 +79,14 @@ pub(crate) fn identify(
 /// Fit to a record that begins with a step, from rest: from another state at the start the step may explain nothing, but who records one
 /// waits for rest. `None` if the output moves before it answers, or if the fit does not predict well.
 fn from_rest(signals: &Signals<'_>, options: &Options) -> Option<Identification> {
-    if !validate::begins_with_a_step(signals.input) || moves_before_answer(signals, 0.0) {
+    let mut breaks = vec![];
+    let used = signals.within(options.span_s, &mut breaks);
+    if !validate::begins_with_a_step(used.input) || moves_before_answer(&used, 0.0) {
         return None;
     }
-    let at_rest = options.input_before(Some(signals.input[0]));
+    let at_rest = options.input_before(Some(used.input[0]));
     let mut found = identify_to(FLOOR, f64::INFINITY, signals, &at_rest);
-    let moves = |of: &Identified| moves_before_answer(signals, of.model.linear().tau_s());
+    let moves = |of: &Identified| moves_before_answer(&used, of.model.linear().tau_s());
     if !is_beyond_doubt(&found) || found.outcome.as_ref().is_ok_and(moves) {
         return None;
     }

@@ -149,6 +149,34 @@ fn a_tank_is_answered_after_three_rows_of_rest() {
     assert!(assumed > 0);
 }
 
+// The same with another input before the span that is asked for.
+#[test]
+fn the_first_input_of_a_span_is_that_of_rest() {
+    for seed in 1..9 {
+        let Test {
+            mut time_s,
+            mut input,
+            mut output,
+        } = tank(seed);
+        let before = |signal: &mut Vec<f64>, value: &dyn Fn(f64) -> f64| {
+            let earlier: Vec<f64> = (-40..0).map(|row| value(f64::from(row))).collect();
+            signal.splice(..0, earlier);
+        };
+        before(&mut time_s, &|row| 0.2 * row);
+        before(&mut input, &|_| 2.0);
+        before(&mut output, &|_| 12.0);
+        let test = Test {
+            time_s,
+            input,
+            output,
+        };
+        let found = test.identify(&Options::default().span_s(Some(0.0), None));
+        let gain = found.outcome.unwrap().estimate.get(Parameter::K).unwrap();
+        let gain = gain.estimate.unwrap();
+        assert!((3.43..3.92).contains(&gain), "{seed}: {gain}");
+    }
+}
+
 /// A step in the fourth row of `rows`, the answer of two lags and a dead time that are shares of the record, and noise of 0.5 % of it.
 fn short(rows: i32, seed: u64) -> (Test, f64) {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
