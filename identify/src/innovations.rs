@@ -4,7 +4,7 @@
 //! the measurement. All of the recording is used, transients included; the initial state is unknown.
 //!
 //! ```text
-//! 1. put the samples on their grid; mark lost, stale and far samples      prepare, outliers
+//! 1. put the samples on their grid; mark lost, stale and far samples      prepare, stale, outliers
 //! 2. find the simplest structure that explains the record         chosen, choose, search
 //! 3. fit it to finer rows; mark samples it cannot predict, fit again      refine
 //!    add drag, friction and thrust, if the record asks for them           forces
@@ -46,6 +46,8 @@ mod record;
 mod response;
 mod result;
 mod search;
+mod spectrum;
+mod stale;
 #[cfg(test)]
 mod starts;
 mod system;
@@ -174,7 +176,7 @@ impl Search<'_> {
         let blocks = fitted.blocks();
         let components = part(FITTED..TESTED, || fitted.posterior(&blocks));
         let tests = validate::tests(&blocks, &fitted.best.found.at);
-        let informative = validate::informative(&blocks, &fitted.best.found);
+        let informative = spectrum::informative(&blocks, &fitted.best.found);
         let prediction = fitted.prediction;
         if let Some(excitation) = &mut self.excitation {
             excitation.outliers = fitted.outliers;
@@ -207,14 +209,14 @@ impl Search<'_> {
         prediction: Option<&Prediction>,
     ) -> Result<(), Verdict> {
         let informative = (self.excitation).and_then(|found| found.informative_rad_per_s);
-        if informative.is_some_and(|band| validate::input_share(blocks, band) <= LEAST_POWER) {
+        if informative.is_some_and(|band| spectrum::input_share(blocks, band) <= LEAST_POWER) {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
         // A few sines fit a few others. Steps are many, however few show over a lag.
         let unknowns = fitted.best.found.theta.free().len() + 1;
         let is_smooth =
             fitted.disturbances != Disturbances::Kept || !blocks.record.keeps_its_input();
-        if is_smooth && validate::order_of_excitation(blocks, LEAST_POWER) < unknowns {
+        if is_smooth && spectrum::order_of_excitation(blocks, LEAST_POWER) < unknowns {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
         let rows = fitted.best.found.at.rows();

@@ -43,6 +43,15 @@ pub(crate) fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|value| *value == values[0])
 }
 
+/// Whether the input is held at a first level, and ten times as long or longer at a second one.
+pub(crate) fn begins_with_a_step(input: &[f64]) -> bool {
+    let mut levels = input.chunk_by(|a, b| a == b).map(<[f64]>::len);
+    let (first, second) = (levels.next(), levels.next());
+    first
+        .zip(second)
+        .is_some_and(|(first, second)| second >= 10 * first)
+}
+
 impl<'a> Signals<'a> {
     /// Samples at an even period (s), none missing.
     #[must_use]

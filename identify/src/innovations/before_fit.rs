@@ -1,6 +1,6 @@
 //! What is known of a recording before any fit.
 
-use super::orthogonal::dot;
+use super::orthogonal::{Orthogonal, dot};
 use super::prepare::{FLOOR, Prepared, prepare};
 use super::record::Blocks;
 use super::{ROWS, outliers, validate};
@@ -76,16 +76,14 @@ pub(super) fn moves_before_answer(signals: &Signals<'_>, tau_s: f64) -> bool {
     if count < FEWEST {
         return false;
     }
-    let times = validate::centred(signals.time_s[..count].iter().copied());
+    let times = validate::centred(time_s[..count].iter().copied());
     let outputs = validate::centred(signals.output[..count].iter().copied());
     let square = dot(&times, &times);
-    let slope = dot(&times, &outputs) / square;
-    let pairs = times.iter().zip(&outputs);
-    let left: Vec<f64> = pairs.map(|(t, y)| y - slope * t).collect();
+    let (left, slopes) = Orthogonal::independent(&[times]).solve(&outputs);
     let size = dot(&left, &left);
     let correlation = (dot(&left[1..], &left[..count - 1]) / size).max(0.0);
     let variance = size / (count - 2) as f64 / square * (1.0 + correlation) / (1.0 - correlation);
-    slope.powi(2) > 9.0 * variance
+    slopes[0].powi(2) > 9.0 * variance
 }
 
 /// Time (s) after which the input is its own negative, over two periods or more, as that of a square wave or a sine: half a period, of which

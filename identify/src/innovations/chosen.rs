@@ -7,11 +7,11 @@ use super::likelihood::Evaluation;
 use super::record::{Blocks, Hold, Record, Rest};
 use super::search;
 use super::theta::{NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, validate};
+use super::{LONGEST_TAU, ROWS, spectrum};
 use crate::progress;
 use crate::remark::Remark;
 use crate::settings::Options;
-use crate::signals::is_constant;
+use crate::signals::{begins_with_a_step, is_constant};
 
 /// Time at the start whose outputs are left out while the dead time is not known, as a share of the record. Most records
 /// begin with the input at rest, and some with all their excitation.
@@ -123,7 +123,7 @@ fn before(record: &Record, limits: &Limits, thetas: &[Theta]) -> Before {
     let of_another = thetas.last().into_iter().chain(&at_rest_theta);
     let another = (of_another.filter_map(after)).min_by(|a, b| a.0.total_cmp(&b.0));
     // Few rows before a step hardly tell that they are at rest, but who records one waits for it.
-    let still = validate::begins_with_a_step(&record.input).then(|| least(&record.at_rest(false)));
+    let still = begins_with_a_step(&record.input).then(|| least(&record.at_rest(false)));
     let still = still.map_or(f64::INFINITY, least_bic);
     let (at_rest, unknown) = (least_bic(at_rest), least_bic(least(record)));
     match another {
@@ -183,8 +183,8 @@ fn choose_on(
 ) -> Option<Choice> {
     let mut part = record.part(part).rounded(CHOOSING_STAMP);
     let samples = Blocks::new(&part, 1, 0.0);
-    let slowest_s = validate::slowest_s(&samples).unwrap_or(f64::INFINITY);
-    let period_s = validate::period_s(&samples).unwrap_or(f64::INFINITY);
+    let slowest_s = spectrum::slowest_s(&samples).unwrap_or(f64::INFINITY);
+    let period_s = spectrum::period_s(&samples).unwrap_or(f64::INFINITY);
     // At rest before the record, at rest where a part begins: the input moves where the part tells most.
     part.rest = part.rest.or(record.rest.map(|_| Rest {
         input: part.input[0],

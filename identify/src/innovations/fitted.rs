@@ -11,7 +11,7 @@ use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, Theta};
-use super::{forces, outliers, output_error, unstable, validate};
+use super::{forces, outliers, output_error, spectrum, unstable, validate};
 use crate::assumed::RecordedLoop;
 use crate::outcome::Prediction;
 use crate::progress;
@@ -100,15 +100,10 @@ impl Fitted {
             if !fitted.predicts_well() && !fitted.is_fed_back(options) {
                 let others = choice.others_than(fitted.best.structure());
                 let fits = others.filter_map(|other| fit(other).ok());
-                let better = fits.filter(|(other, _)| other.explained() >= WELL_PREDICTED);
+                let explained = |of: &Self| of.prediction.map_or(0.0, |found| found.explained);
+                let better = fits.filter(|(other, _)| explained(other) >= WELL_PREDICTED);
                 (fitted, own) = better
-                    .reduce(|a, b| {
-                        if b.0.explained() > a.0.explained() {
-                            b
-                        } else {
-                            a
-                        }
-                    })
+                    .max_by(|(a, _), (b, _)| explained(a).total_cmp(&explained(b)))
                     .unwrap_or((fitted, own));
             }
         }
@@ -227,12 +222,6 @@ impl Fitted {
         Ok(fitted)
     }
 
-    /// Share of the variance of the last third that a fit to the first two thirds predicts.
-    fn explained(&self) -> f64 {
-        self.prediction
-            .map_or(0.0, |prediction| prediction.explained)
-    }
-
     fn predicts_well(&self) -> bool {
         self.prediction.is_none_or(|found| found.is_good())
     }
@@ -276,7 +265,7 @@ impl Fitted {
 
     fn prediction_by(&self, theta: &Theta) -> Option<Prediction> {
         let blocks = self.blocks();
-        let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
+        let horizon_s = spectrum::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
         // An unstable process is not predicted beyond the time in which it grows.
         let horizon_s = match theta.grows {
             true => horizon_s.min(-1.0 / theta.process(1.0).pole_per_s()),
@@ -371,7 +360,7 @@ fn whiter(record: &Record, best: &Candidate, limits: &Limits, samples: usize) ->
         return None;
     }
     let fast_s = theta.shortest_lag_s() + theta.tau_s().max(0.0);
-    let longest_s = fast_s.min(LONGEST_ROW * validate::shortest_period_s(&blocks)?);
+    let longest_s = fast_s.min(LONGEST_ROW * spectrum::shortest_period_s(&blocks)?);
     let is_short = |count: &usize| {
         *count as f64 * record.dt_s < longest_s && record.len() / count >= FEWEST_LONG_ROWS
     };

@@ -18,7 +18,7 @@ use onecycle_design::{Controller, Model};
 use super::orthogonal::Orthogonal;
 use super::record::{Blocks, Hold, Record};
 use super::search;
-use super::validate;
+use super::{spectrum, validate};
 
 /// Past rows of input and output.
 const LAGS: usize = 20;
@@ -114,7 +114,7 @@ impl Flexible {
 
     fn frequencies(&self) -> Vec<f64> {
         let ends = [2.0 * PI / self.length_s, HIGHEST * PI / self.row_s];
-        validate::spaced(ends, FREQUENCIES)
+        spectrum::spaced(ends, FREQUENCIES)
     }
 
     /// Frequency response, and its standard deviation: that of its linear part in the coefficients.

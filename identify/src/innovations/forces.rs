@@ -11,8 +11,8 @@
 use super::descent::Found;
 use super::record::{Blocks, Forces, Record};
 use super::search::{self, Candidate};
+use super::spectrum;
 use super::theta::Theta;
-use super::validate;
 use crate::nonlinear::Nonlinear;
 use crate::signals::range;
 
@@ -78,7 +78,7 @@ pub(super) fn forces(
     if !record.uneven_s.is_empty() {
         return None;
     }
-    let period_s = validate::period_s(&Blocks::new(record, samples, skip_s))?;
+    let period_s = spectrum::period_s(&Blocks::new(record, samples, skip_s))?;
     let mut trial = record.clone();
     let mut chosen: Option<(Asked, Candidate)> = None;
     // The best force alone; then another one beside it.

@@ -8,9 +8,10 @@ use onecycle_design::LowPass;
 use super::LONGEST_TAU;
 use super::orthogonal::Orthogonal;
 use super::record::{Forces, Hold, Record, Rest};
+use super::stale::mark_stale;
 use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
-use crate::signals::{Signals, is_constant, rounding_deviation, smallest_step};
+use crate::signals::{Signals, is_constant, rounding_deviation};
 use crate::verdict::Verdict;
 
 /// Fewest samples to fit. With fewer, none of 72 simulated tests was answered; from here on nearly all, rightly
@@ -25,10 +26,6 @@ const SPARSE: usize = 6;
 /// Uneven time stamps are rounded to this part of the sample period, so that few lengths of step occur. The rounding has a standard
 /// deviation of `STAMP / 12^0.5`; behind a lag of five samples it moves the output by less than [`FLOOR`].
 const STAMP: f64 = 1.0 / 64.0;
-/// An output that repeats the one before is stale if at least this share of all other outputs is distinct, or if this
-/// share of the runs of equal outputs has one length: the sensor is slower than the recording. A coarse sensor has few
-/// distinct values and runs of all lengths, and its repetitions are measurements.
-const ALIKE: f64 = 0.9;
 
 /// Share of the movement of an output to which a sample is believed. No sensor is truer, and no process follows a model to less:
 /// without it a simulation without noise has resonances and forces of a ten-thousandth.
@@ -94,10 +91,7 @@ pub(super) fn prepare(
     };
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
-    record.rest = rest.map(|input| Rest {
-        input,
-        may_drift: false,
-    });
+    record.rest = rest;
     let (rounding, sharing) = rounding(&record);
     record.floor = (believed * movement(&record)).max(rounding * sharing.sqrt());
     let longest_tau_s = LONGEST_TAU * record.time_s(record.len() - 1);
@@ -193,14 +187,17 @@ fn longest_part(asked: &Range<usize>, breaks: &[usize]) -> Range<usize> {
     longest
 }
 
-/// Input before the record under which the process was at rest: that which the user has `stated`; for an input that never
-/// changes zero, as before a step in the first row. `None`: not known.
-fn before(input: &[f64], output: &[f64], stated: Option<f64>) -> Result<Option<f64>, Verdict> {
+/// Rest before the record: under the input that the user has `stated`; for an input that never changes under zero, as before a step in the
+/// first row. `None`: not known.
+fn before(input: &[f64], output: &[f64], stated: Option<f64>) -> Result<Option<Rest>, Verdict> {
     let rest = stated.or(is_constant(input).then_some(0.0));
     if is_constant(input) && (rest == Some(input[0]) || is_constant(output)) {
         return Err(Verdict::ConstantInput);
     }
-    Ok(rest)
+    Ok(rest.map(|input| Rest {
+        input,
+        may_drift: false,
+    }))
 }
 
 fn check(input: &[f64], output: &[f64]) -> Result<(), Verdict> {
@@ -336,95 +333,6 @@ fn spread(
     record
 }
 
-/// Marks stale outputs as absent: the sensor is slower than the recording, or an update was lost.
-fn mark_stale(record: &mut Record) {
-    let present: Vec<usize> = (0..record.len()).filter(|i| record.present[*i]).collect();
-    let runs = present.chunk_by(|a, b| record.output[*a] == record.output[*b]);
-    let runs: Vec<&[usize]> = runs.collect();
-    let mut values: Vec<u64> = present
-        .iter()
-        .map(|i| record.output[*i].to_bits())
-        .collect();
-    values.sort_unstable();
-    values.dedup();
-    let is_distinct = values.len() as f64 >= ALIKE * runs.len() as f64;
-    let seems_stale = is_distinct || is_regular(&runs);
-    if !seems_stale || is_staircase(record) {
-        return;
-    }
-    let rests = rests(record, &runs);
-    for (run, rest) in runs.iter().zip(rests) {
-        for &index in &run[rest.max(1)..] {
-            record.present[index] = false;
-        }
-    }
-}
-
-/// Samples at the start of each run of equal outputs in which the process is at rest: under one input, for longer than between two
-/// updates of a sensor, from the first sample on or after a change of one step of its resolution, as at the end of a response.
-fn rests(record: &Record, runs: &[&[usize]]) -> Vec<usize> {
-    let outputs: Vec<f64> = record.present_outputs().collect();
-    let one_step = 1.5 * resolution(&outputs);
-    let updates = 2 * median_length(runs);
-    let mut before = None;
-    let rest = |run: &&[usize]| {
-        let output = record.output[run[0]];
-        let is_reached = before
-            .replace(output)
-            .is_none_or(|before: f64| (output - before).abs() < one_step);
-        let is_held = |index: &&usize| record.input[**index] == record.input[run[0]];
-        let held = run.iter().take_while(is_held).count();
-        if is_reached && held > updates {
-            held
-        } else {
-            0
-        }
-    };
-    runs.iter().map(rest).collect()
-}
-
-/// The smallest change of an output, if nearly all others are multiples of it; zero for others: a response that stops where it moves has a
-/// smallest change too.
-fn resolution(outputs: &[f64]) -> f64 {
-    let step = smallest_step(outputs);
-    let sizes = outputs.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let steps: Vec<f64> = sizes
-        .filter(|size| *size > 0.0)
-        .map(|size| size / step)
-        .collect();
-    let whole = steps
-        .iter()
-        .filter(|steps| (*steps - steps.round()).abs() < 0.2);
-    match whole.count() as f64 >= ALIKE * steps.len() as f64 {
-        true => step,
-        false => 0.0,
-    }
-}
-
-fn median_length(runs: &[&[usize]]) -> usize {
-    let mut lengths: Vec<usize> = runs.iter().map(|run| run.len()).collect();
-    let count = lengths.len();
-    *lengths.select_nth_unstable(count / 2).1
-}
-
-/// Whether most changes of the output are of its smallest step: then what repeats is rounded, and not stale.
-fn is_staircase(record: &Record) -> bool {
-    let outputs: Vec<f64> = record.present_outputs().collect();
-    // Two steps at once are the next larger change.
-    let one_step = 1.5 * smallest_step(&outputs);
-    let sizes = outputs.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let changes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
-    let small = changes.iter().filter(|size| **size < one_step);
-    2 * small.count() > changes.len()
-}
-
-/// Whether most runs of equal outputs have one length, or a multiple of it, above one sample.
-fn is_regular(runs: &[&[usize]]) -> bool {
-    let median = median_length(runs);
-    let alike = runs.iter().filter(|run| run.len() % median == 0).count();
-    median > 1 && alike as f64 >= ALIKE * runs.len() as f64
-}
-
 #[cfg(test)]
 mod tests {
     use onecycle_plant::{Noise, NoiseSource};
@@ -473,60 +381,6 @@ mod tests {
         let found = prepared(&times_s, &ramp(times_s.len()), &[]).record;
         assert!((found.dt_s - 0.005).abs() < 1e-9);
         assert!(!found.present[1] && found.input[1] == found.input[0]);
-    }
-
-    #[test]
-    fn stale_outputs_are_absent_but_those_of_a_coarse_sensor_are_not() {
-        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
-        let mut output = ramp(300);
-        output[100..110].fill(0.5);
-        let stale = prepared(&times_s, &output, &[]).record;
-        assert_eq!(stale.present.iter().filter(|p| !**p).count(), 9);
-        let coarse: Vec<f64> = output.iter().map(|y| (2.0 * y).round()).collect();
-        assert!(
-            prepared(&times_s, &coarse, &[])
-                .record
-                .present
-                .iter()
-                .all(|p| *p)
-        );
-    }
-
-    // Before a step, and after its response has come to rest within the resolution, all outputs are equal. A sensor that stops while
-    // the output moves is stale, as is one under an input that changes.
-    #[test]
-    fn an_output_at_rest_is_not_stale() {
-        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
-        let response = |k: i32| 1.0 - (-f64::from(k.max(100) - 100) / 12.0).exp();
-        let absent = |step: f64, last: i32, input: &dyn Fn(i32) -> f64| {
-            let output = |k: i32| (response(k.min(last)) / step).round() * step;
-            let outputs: Vec<f64> = (0..300).map(output).collect();
-            let inputs: Vec<f64> = (0..300).map(input).collect();
-            let mut record = gridded(&times_s, &inputs, &outputs, &[true; 300]);
-            mark_stale(&mut record);
-            record.present.iter().filter(|present| !**present).count()
-        };
-        let step = |k: i32| f64::from(k >= 100);
-        assert!(
-            absent(1e-3, 300, &step) < 100,
-            "{}",
-            absent(1e-3, 300, &step)
-        );
-        // What repeats of the 190 after the last change, and the first sample of the step.
-        assert_eq!(absent(1e-3, 110, &step), 190);
-        assert!(absent(1e-3, 300, &|k| f64::from(k % 2)) > 150);
-    }
-
-    // A temperature that rises by 1 degree every few samples never shows one twice.
-    #[test]
-    fn a_staircase_is_not_stale() {
-        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
-        let rising: Vec<f64> = (0..300).map(|k| f64::from(k / 4)).collect();
-        let found = prepared(&times_s, &rising, &[]).record;
-        assert!(found.present.iter().all(|present| *present));
-        let slow: Vec<f64> = rising.iter().map(|k| (0.37 * k).sin()).collect();
-        let stale = prepared(&times_s, &slow, &[]).record;
-        assert_eq!(stale.present_outputs().count(), 75);
     }
 
     // Steps of 1, with three samples on each: sqrt(2/12); with one: none.

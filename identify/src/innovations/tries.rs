@@ -4,13 +4,13 @@ use std::cell::LazyCell;
 use std::f64::consts::FRAC_PI_2;
 
 use super::before_fit::{first_answer_s, mirrored_s, moves_before_answer};
+use super::identify_to;
 use super::prepare::FLOOR;
-use super::{identify_to, validate};
 use crate::excitation::Excitation;
 use crate::outcome::{Identification, Identified, Refused};
 use crate::remark::Remark;
 use crate::settings::Options;
-use crate::signals::Signals;
+use crate::signals::{Signals, begins_with_a_step};
 use crate::thresholds::BELIEVED_LESS;
 use crate::verdict::Verdict;
 
@@ -81,7 +81,7 @@ pub(crate) fn identify(
 fn from_rest(signals: &Signals<'_>, options: &Options) -> Option<Identification> {
     let mut breaks = vec![];
     let used = signals.within(options.span_s, &mut breaks);
-    if !validate::begins_with_a_step(used.input) || moves_before_answer(&used, 0.0) {
+    if !begins_with_a_step(used.input) || moves_before_answer(&used, 0.0) {
         return None;
     }
     let at_rest = options.input_before(Some(used.input[0]));

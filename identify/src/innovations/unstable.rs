@@ -15,7 +15,7 @@ use super::chosen::rows_for;
 use super::record::{Blocks, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
-use super::{LONGEST_TAU, validate};
+use super::{LONGEST_TAU, spectrum};
 use crate::thresholds::SURE;
 
 /// Past outputs of the prediction: two poles, and four for the noise of the sensor and the walk of a disturbance.
@@ -122,7 +122,7 @@ fn likely_growth_per_s(record: &Record) -> Option<f64> {
         let nearest = growths.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
         nearest.map(|(growth, _)| growth)
     };
-    let of_input = || Some(TAU / validate::period_s(rows.first()?)?);
+    let of_input = || Some(TAU / spectrum::period_s(rows.first()?)?);
     of(SURE).or_else(|| of(0.0)).or_else(of_input)
 }
 

@@ -11,5 +11,6 @@ mod instrument;
 mod lags;
 mod names;
 mod outcomes;
+mod rest;
 mod steps;
 mod unstable;
